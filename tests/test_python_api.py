@@ -131,7 +131,7 @@ def test_mistakes_are_the_sentences_of_the_command_line_all_at_once(scene: Scene
         scene.swap("damping", at="9 s", damping=0.8)
     with pytest.raises(SceneError, match="cannot be set"):
         scene.set({"device.mass": 1.0}, at=0.1)
-    with pytest.raises(KeyError, match="There is no walls in this scene; it holds title"):
+    with pytest.raises(KeyError, match=r"no walls in this scene \(did you mean wall\?\); it holds title"):
         scene["walls"]
     with pytest.raises(ValueError, match="A pace of 1 needs the clock of a run as processes"):
         run(scene, pace=1)

@@ -15,6 +15,7 @@ from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.layers import Layers, lay_overrides
 from haploop.launch.scene.toml_writer import inline, to_toml
 from haploop.launch.scene.unmodelled import demand_modelled
+from haploop.protocol.names import meant
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Tables
 
@@ -50,7 +51,7 @@ class LoadedScene:
 
     def __getitem__(self, key: str) -> Any:
         if key not in (tables := self.tables):
-            raise KeyError(f"There is no {key} in this scene; it holds {', '.join(tables)}.")
+            raise KeyError(f"There is no {key} in this scene{meant(key, tables)}; it holds {', '.join(tables)}.")
         return tables[key]
 
     def __contains__(self, key: str) -> bool:

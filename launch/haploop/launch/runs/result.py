@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,6 +21,7 @@ from haploop.launch.spec import SCENE, make_output
 from haploop.logger.log.recording import MemoryLog, Recording, Table
 from haploop.logger.session import LOG
 from haploop.logger.summary import Summary
+from haploop.protocol.names import meant
 
 if TYPE_CHECKING:
     import pint
@@ -32,6 +34,15 @@ _UNITS = {"_N_m": "N/m", "_m_s": "m/s", "_1_s": "1/s", "_m": "m", "_s": "s", "_N
 def unit_of(key: str) -> str:
     """Returns the unit of a number of a summary, by its key; "" for none."""
     return next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
+
+
+def _numbers(entry: Any, key: str = "") -> Iterator[tuple[str, float | None]]:
+    """Yields the numbers of a summary, or None where the run did not come to one, by dotted key."""
+    if isinstance(entry, dict | list):
+        for name, inner in entry.items() if isinstance(entry, dict) else enumerate(entry):
+            yield from _numbers(inner, f"{key}.{name}".lstrip("."))
+    elif entry is None or (isinstance(entry, int | float) and not isinstance(entry, bool)):
+        yield key, entry
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,13 +82,14 @@ class Result:
         A number that the run did not come to, None in the summary, is NaN.
 
         Raises:
-            KeyError: there is no such entry.
+            KeyError: there is no such number; the message names the nearest.
         """
         import pint
 
-        value: Any = self.summary
-        for part in key.split("."):
-            value = value[int(part) if isinstance(value, list) else part]
+        known = dict(_numbers(self.summary))
+        if key not in known:
+            raise KeyError(f"There is no number {key} in the summary{meant(key, known)}; it has {', '.join(known)}.")
+        value = known[key]
         return pint.get_application_registry().Quantity(math.nan if value is None else value, unit_of(key))
 
     def __repr__(self) -> str:

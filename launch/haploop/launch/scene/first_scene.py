@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from haploop.launch.scene.bundled import bundled
-from haploop.launch.scene.mistakes import nearest
 from haploop.launch.scene.toml_writer import inline
+from haploop.protocol.names import nearest
 
 _TEXT = """\
 # A scene for haploop. What it does not say it takes from the files it extends; what they do not say is left out of the

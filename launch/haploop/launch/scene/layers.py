@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from haploop.launch.scene.bundled import bundled, found
-from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, counted, nearest, shown
+from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, counted, shown
 from haploop.launch.scene.toml_writer import inline
 from haploop.protocol.files import read_text
+from haploop.protocol.names import nearest
 from haploop.protocol.scene.table import Tables
 
 KeyPath = tuple[str | int, ...]

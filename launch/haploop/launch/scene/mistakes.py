@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -47,11 +46,6 @@ class SceneError(ValueError):
         told = [str(mistake) for mistake in self.mistakes[:_MOST_TOLD]]
         more = len(self.mistakes) - len(told)
         super().__init__("\n".join([*told, f"... and {counted(more, 'more mistake')}."] if more else told))
-
-
-def nearest(name: object, allowed: Iterable[str]) -> str | None:
-    """Returns the allowed name closest to ``name``, if one is close."""
-    return next(iter(difflib.get_close_matches(str(name), list(allowed), n=1)), None)
 
 
 def counted(count: int, name: str) -> str:

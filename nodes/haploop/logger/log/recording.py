@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from haploop.logger.log.table import Floats, pack
 from haploop.protocol.changes import Event
+from haploop.protocol.names import meant
 
 if TYPE_CHECKING:
     import pandas
@@ -34,7 +35,7 @@ class Table(dict[str, Floats]):
         self.units = {name: units[name] for name in self}
 
     def __missing__(self, name: str) -> NoReturn:
-        raise KeyError(f"There is no column {name}; the columns are {', '.join(self)}.")
+        raise KeyError(f"There is no column {name}{meant(name, self)}; the columns are {', '.join(self)}.")
 
     def quantity(self, name: str) -> pint.Quantity[Floats]:
         """Returns a column with its unit, as a quantity of pint's application registry."""
@@ -78,7 +79,8 @@ class Recording(dict[str, Any]):
         self.attachments = attachments
 
     def __missing__(self, topic: str) -> NoReturn:
-        raise KeyError(f"There is no channel {topic} in this log; its channels are {', '.join(self) or 'none'}.")
+        hint, known = meant(topic, self), ", ".join(self) or "none"
+        raise KeyError(f"There is no channel {topic} in this log{hint}; its channels are {known}.")
 
 
 def join(

@@ -14,8 +14,8 @@ from haploop.controller.dissipation import Element
 from haploop.launch.scene.bundled import bundled, found
 from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers, read_layers
-from haploop.launch.scene.mistakes import nearest
 from haploop.protocol.changes import Change, at_work
+from haploop.protocol.names import nearest
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.walls.registry import class_of
 from haploop.tools.advise.walls.cases import MOST_DELAY_S

@@ -92,7 +92,7 @@ def _rates(text: str) -> list[int]:
 
 
 def _methods(text: str | None) -> list[str]:
-    from haploop.launch.scene.mistakes import nearest
+    from haploop.protocol.names import nearest
     from haploop.tools.cost.grid import METHODS
 
     if text is None:

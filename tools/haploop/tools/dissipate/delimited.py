@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from haploop.launch.scene.mistakes import nearest
 from haploop.protocol.files import demand_regular
+from haploop.protocol.names import nearest
 from haploop.tools.dissipate.samples import Floats, RecordingError
 
 _BLOCK_ROWS = 16_384

@@ -58,12 +58,7 @@ def sweep(request: Request, as_json: bool) -> None:
         leave(f"--workers must be at least 1, but {request.workers} was given.", WRONG_USE)
     with plain_errors():
         try:
-            pyarrow()
-            made = load(request.path, request.overrides, read_sources(request.plugins))
-            if request.compiled:
-                _demand_compiler(made)
-            directory = _directory(request, made)
-            summary = _run(request, made, directory)
+            directory, summary = carry_out(request)
         except (NeedsPyarrow, ExecutorError) as error:
             leave(str(error), WRONG_USE)
         except StoreError as error:
@@ -80,6 +75,22 @@ def sweep(request: Request, as_json: bool) -> None:
     print(directory, file=sys.stderr)
     if summary["ended"] != "done":
         leave(f"Stopped; to go on: haploop sweep {directory / SWEEP} --out {directory}", FAILED)
+
+
+def carry_out(request: Request) -> tuple[Path, Summary]:
+    """Runs what is missing of a sweep; returns its directory and summary.
+
+    Raises:
+        SceneError, PluginError: the sweep cannot be run.
+        NeedsPyarrow, ExecutorError: something it needs is not installed or cannot be reached.
+        OutputError, StoreError, LogError: the directory, or what is in it, cannot be used.
+    """
+    pyarrow()
+    made = load(request.path, request.overrides, read_sources(request.plugins))
+    if request.compiled:
+        _demand_compiler(made)
+    directory = _directory(request, made)
+    return directory, _run(request, made, directory)
 
 
 def _run(request: Request, made: Sweep, directory: Path) -> Summary:

@@ -14,9 +14,9 @@ from pydantic import ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from haploop.launch.scene.layers import Layers
-from haploop.launch.scene.mistakes import nearest
 from haploop.launch.scene.models import Model, scene_model
 from haploop.launch.scene.number import Number, si
+from haploop.protocol.names import nearest
 from haploop.protocol.quantity import Quantity
 
 if TYPE_CHECKING:

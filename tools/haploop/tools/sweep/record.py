@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.result import unit_of
-from haploop.launch.scene.mistakes import nearest
 from haploop.launch.spec import RunFailed
 from haploop.logger.summary import OF_THE_MACHINE, Summary
+from haploop.protocol.names import nearest
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.sweep.table import ENDED, NUMBER, TEXT, TRUTH, WHY, Column
 

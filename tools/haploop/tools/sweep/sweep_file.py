@@ -16,10 +16,11 @@ from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.bundled import found
 from haploop.launch.scene.check import complain
 from haploop.launch.scene.layers import KeyPath, Layers, key_path, lay_overrides, parse
-from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError, nearest, shown
+from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError, shown
 from haploop.launch.scene.models import Model
 from haploop.launch.scene.number import Number, si
 from haploop.launch.scene.schema import TomlSchema
+from haploop.protocol.names import nearest
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.work import Sources, load_kinds

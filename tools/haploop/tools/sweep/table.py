@@ -14,6 +14,7 @@ import numpy as np
 
 from haploop.logger.summary import versions
 from haploop.protocol.files import demand_regular, read_text
+from haploop.protocol.names import meant
 
 # What stands in every table beside the axes and what is recorded.
 CELL, SEED, ENDED, WHY, SCENE = "cell", "seed", "ended", "why", "scene"
@@ -110,7 +111,9 @@ class SweepTable:
 
     def __getitem__(self, name: str) -> np.ndarray:
         if name not in self.columns:
-            raise KeyError(f"There is no column {name}; there are {', '.join(self.columns)}.")
+            raise KeyError(
+                f"There is no column {name}{meant(name, self.columns)}; there are {', '.join(self.columns)}."
+            )
         return self.columns[name]
 
     def __len__(self) -> int:

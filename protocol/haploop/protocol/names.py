@@ -1,0 +1,18 @@
+"""The name that was meant, where one is given that is none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+def nearest(name: object, allowed: Iterable[str]) -> str | None:
+    """Returns the allowed name closest to ``name``, if one is close."""
+    import difflib
+
+    return next(iter(difflib.get_close_matches(str(name), list(allowed), n=1)), None)
+
+
+def meant(name: object, allowed: Iterable[str]) -> str:
+    """Returns " (did you mean NAME?)", by the nearest of the allowed names; "" where none is close."""
+    found = nearest(name, allowed)
+    return f" (did you mean {found}?)" if found else ""

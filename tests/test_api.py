@@ -1,0 +1,114 @@
+"""haploop.api: the bits of the command line, a live loop steered from Python, arrays, and names that are none."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import haploop.api
+from haploop.api import attach, dissipate, load, plot, read, run, start, sweep
+from haploop.launch.processes.run_directory import CommandRefused, RunNotFound
+from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.spec import RunFailed
+from haploop.logger.summary import read as read_summary
+from haploop.tools.cli.app import app
+
+# Begins inside the wall.
+SHORT = {"duration": 0.3, "device.position": -0.0605}
+
+
+def test_the_front_door_imports_nothing_before_it_is_used_and_tells_the_nearest_of_a_wrong_name() -> None:
+    code = "import sys, haploop.api; print({'numpy', 'pydantic', 'zmq', 'mcap', 'pint', 'difflib'} & set(sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
+    assert all(getattr(haploop.api, name) for name in haploop.api.__all__)
+    assert set(haploop.api.__all__) <= set(dir(haploop.api))
+    with pytest.raises(AttributeError, match=r"no dissipat \(did you mean dissipate\?\)"):
+        _ = haploop.api.dissipat
+
+
+def test_every_bit_is_that_of_the_command_line(tmp_path: Path) -> None:
+    words = [word for key, value in SHORT.items() for word in ("--set", f"{key}={value}")]
+    CliRunner().invoke(app, ["run", "fig6c", *words, "--in-process", "--out", str(tmp_path / "there")])
+    here = run(load("fig6c", SHORT), tmp_path / "here")
+    there = read_summary(tmp_path / "there" / "summary.json")
+    assert here.summary["trajectory_sha256"] == there["trajectory_sha256"]
+    assert np.array_equal(here["/plant"]["x"], read(tmp_path / "there")["/plant"]["x"])
+
+
+def test_a_wrong_quantity_is_told_with_the_nearest() -> None:
+    result = run(load("fig6c", SHORT))
+    with pytest.raises(KeyError, match=r"window.oscilation_m in the summary \(did you mean window.oscillation_m\?\)"):
+        result.quantity("window.oscilation_m")
+    with pytest.raises(KeyError, match=r"no channel /plnt in this log \(did you mean /plant\?\)"):
+        result["/plnt"]
+    with pytest.raises(KeyError, match=r"no column forse \(did you mean force\?\)"):
+        result["/plant"]["forse"]
+    with pytest.raises(SceneError, match=r"did you mean stiffness\?"):
+        load("fig6c", {"wall.stifness": 1})
+    with pytest.raises(ValueError, match="kept in memory alone"):
+        plot(result)
+
+
+def test_elements_on_a_recorded_motion_take_what_the_formula_says(tmp_path: Path) -> None:
+    """Damping at constant speed takes b v times the way, but for its first sample, of which no speed is known."""
+    recording = tmp_path / "way.csv"
+    recording.write_text("t,x\n" + "".join(f"{k * 1e-3:.3f},{k * 1e-4:.4f}\n" for k in range(1001)), encoding="utf-8")
+    [damping] = dissipate(recording, damping=[2.0]).elements
+    assert damping.true_J == pytest.approx(2.0 * 0.1 * 0.1, rel=2e-3)
+    assert dissipate(recording, damping=["0.002 N s/mm"]).elements[0].true_J == damping.true_J
+
+
+@pytest.mark.slow
+def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_scene(tmp_path: Path) -> None:
+    scene = load("fig6b", SHORT)
+    with start(scene, tmp_path / "out", paused=True) as loop:
+        assert attach(loop.id[:4]).id == loop.id
+        with pytest.raises(TimeoutError):
+            loop.wait(0.01)
+        assert loop.step(100) == 100
+        assert loop.time_s == pytest.approx(0.1)
+        with pytest.raises(CommandRefused, match="did you mean damping"):
+            loop.swap("dampin", damping=1.0)
+        tick = loop.swap("unidirectional-inertia", mass="10 g")
+        loop.set({"wall.stiffness": "0.2 N/mm"}, at=0.2)
+        live = loop.finish()
+        assert loop.wait() is live
+        with pytest.raises(RunNotFound):
+            loop.pause()
+    written = scene.swap("unidirectional-inertia", at=tick * 1e-3, mass=0.01).set({"wall.stiffness": 200}, at=0.2)
+    assert live.summary["trajectory_sha256"] == run(written).summary["trajectory_sha256"]
+    assert live.directory == tmp_path / "out"
+    assert live["/plant"]["x"].dtype == np.float64
+
+
+@pytest.mark.slow
+def test_watching_a_live_loop_shows_what_its_log_will_hold_and_leaving_it_ends_it(tmp_path: Path) -> None:
+    with start(load("fig6b", SHORT), pace=1.0) as loop:
+        seen = list(loop.watch())
+        result = loop.wait(60.0)
+    assert result.directory is None
+    logged = result["/controller"]
+    for block in seen:
+        first = round(block["t"][0] * 1000)
+        assert np.array_equal(block["x"], logged["x"][first : first + len(block["x"])])
+    assert sum(len(block["t"]) for block in seen) > 100
+    (tmp_path / "mine.txt").touch()
+    with pytest.raises(RunFailed, match="must be new or empty"):
+        start("fig6b", tmp_path)
+
+
+@pytest.mark.slow
+def test_a_sweep_over_an_array_has_a_row_for_every_value_each_as_its_own_run() -> None:
+    scene = load("fig6b", {"duration": 0.5})
+    table = sweep(scene, {"wall.stiffness": np.array([100.0, 150.0])}, workers=1)
+    assert table["wall.stiffness"].tolist() == [100.0, 150.0]
+    assert table["verdict"].tolist() == [run(scene.set({"wall.stiffness": k})).verdict for k in (100, 150)]
+    with pytest.raises(KeyError, match=r"did you mean wall.stiffness\?"):
+        table["wall.stifness"]
+    with pytest.raises(TypeError, match="swept over axes"):
+        sweep(scene)

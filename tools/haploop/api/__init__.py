@@ -1,0 +1,61 @@
+"""The front door for Python: what the command line does, as functions that return arrays and numbers.
+
+::
+
+    from haploop.api import load, run, start
+
+    scene = load("demo", {"wall.stiffness": "3 N/mm"})      # a file of yours, or a name that `haploop scenes` lists
+    result = run(scene)                                     # in this process, in memory; the bits of `haploop run`
+    result.verdict, result.quantity("window.oscillation_m")
+    result["/plant"]["x"], result["/plant"].units["x"]      # a NumPy array, and its unit
+
+    with start(scene, paused=True) as loop:                 # plant, controller and logger as processes, steered
+        loop.step(1000)
+        loop.swap("damping", damping="5 N s/m")
+        steadied = loop.finish()
+
+Values are numbers in SI units, text with a unit or quantities of pint; a wrong name is told with the nearest. Nothing
+is imported before it is first used. A program that sweeps or advises starts workers, which import it
+again: begin it with ``if __name__ == "__main__":``, as multiprocessing asks.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from haploop.api.live import LiveLoop, attach, start
+    from haploop.api.studies import advise, dissipate, plot, sweep
+    from haploop.launch.runs.loaded_scene import LoadedScene as Scene
+    from haploop.launch.runs.loaded_scene import load
+    from haploop.launch.runs.result import Result, run
+    from haploop.logger.log.stream import read
+
+__all__ = [
+    "LiveLoop", "Result", "Scene", "advise", "attach", "dissipate", "load", "plot", "read", "run", "start",
+    "sweep",
+]  # fmt: skip
+
+_HOMES = {
+    "Scene": "launch.runs.loaded_scene.LoadedScene",
+    "load": "launch.runs.loaded_scene.load",
+    "Result": "launch.runs.result.Result",
+    "run": "launch.runs.result.run",
+    "read": "logger.log.stream.read",
+    **{name: f"api.live.{name}" for name in ("LiveLoop", "attach", "start")},
+    **{name: f"api.studies.{name}" for name in ("advise", "dissipate", "plot", "sweep")},
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        from haploop.protocol.names import meant
+
+        raise AttributeError(f"haploop.api has no {name}{meant(name, _HOMES)}; it has {', '.join(__all__)}.")
+    module, _, attribute = _HOMES[name].rpartition(".")
+    return getattr(import_module(f"haploop.{module}"), attribute)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,178 @@
+"""Many scenes, recordings and figures from Python: sweep, advise, dissipate, plot."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from haploop.controller.dissipation import registry
+from haploop.launch.runs.loaded_scene import LoadedScene, Values, load, plain, texts
+from haploop.launch.runs.result import Result
+from haploop.launch.scene.toml_writer import to_toml
+
+if TYPE_CHECKING:
+    from haploop.tools.advise.advice import Advice
+    from haploop.tools.dissipate.outcome import Outcome
+    from haploop.tools.sweep.table import SweepTable
+
+Plugins = Iterable[str | Path]
+# Numbers of an element, each an SI number or text with its unit.
+Amounts = Iterable[float | str]
+
+
+def sweep(
+    of: LoadedScene | str | Path,
+    axes: Mapping[str, Any] | None = None,
+    *,
+    values: Values = (),
+    out: str | Path | None = None,
+    workers: int | None = None,
+    plugins: Plugins = (),
+) -> SweepTable:
+    """Runs a scene over one to three axes, on every core; ``table["wall.stiffness"]`` is a NumPy column.
+
+    Args:
+        of: a sweep file, or a name that ``haploop scenes`` lists; with ``axes``, a scene or its file.
+        axes: by key of the scene, an array or list of values, or a table ``{"from": 100, "to": 2000, "count": 20}``.
+        values: laid over the scene, as in ``load``.
+        out: directory of the table; one that holds this very sweep goes on. When None, nothing is kept.
+        workers: processes; one a core when None.
+        plugins: files with elements.
+
+    Raises:
+        SceneError, PluginError: the sweep cannot be run.
+        NeedsPyarrow: pyarrow is not installed.
+        OutputError, StoreError: the directory cannot be used.
+    """
+    from haploop.tools.sweep.command import Request, carry_out
+    from haploop.tools.sweep.table import read
+
+    with tempfile.TemporaryDirectory(prefix="haploop-") as scratch:
+        path = Path(of) if isinstance(of, str | Path) else of.path
+        files = [Path(plugin) for plugin in plugins]
+        if axes is not None:
+            scene = of if isinstance(of, LoadedScene) else load(of, plugins=files)
+            files = files or list(dict.fromkeys(scene.plugin_files.values()))
+            listed = {key: getattr(points, "tolist", lambda of=points: of)() for key, points in axes.items()}
+            made = {"title": scene["title"], "base": scene.tables, "axes": plain(listed)}
+            path = Path(scratch, "sweep.toml")
+            path.write_text(to_toml(made), encoding="utf-8")
+        elif isinstance(of, LoadedScene):
+            raise TypeError('A scene is swept over axes, such as sweep(scene, {"wall.stiffness": [200, 400]}).')
+        directory = Path(out) if out is not None else Path(scratch, "sweep")
+        request = Request(path, texts(values), directory, workers, plugins=files)
+        return read(carry_out(request)[0])
+
+
+def advise(
+    device: str | Path,
+    *,
+    hand: str | None = None,
+    delay: str | float | None = None,
+    estimator: str | None = None,
+    values: Values = (),
+    plugins: Plugins = (),
+    workers: int | None = None,
+    out: str | Path | None = None,
+) -> Advice:
+    """Says how stiff a wall is safe on a device, with which element, and what breaks it first; takes minutes.
+
+    Args:
+        device: a device that ``haploop scenes`` lists, or a scene file.
+        hand: a hand that it lists, a file with one, or "none".
+        delay: round trip, in s or text with its unit.
+        estimator: of the velocity, when not the scene's.
+        values: laid over device or scene, as in ``load``.
+        plugins: files with elements that the scene names.
+        workers: processes; one a core when None.
+        out: directory in which every tried wall is kept, so that an advice that was interrupted goes on.
+
+    Raises:
+        InvalidRequest: a name is none.
+        SceneError, PluginError, ElementError: the scene cannot be run.
+    """
+    from haploop.launch.scene.events import elements_of, try_out
+    from haploop.tools.advise.advice import advice
+    from haploop.tools.advise.command import WALLS
+    from haploop.tools.advise.subject import make_subject
+    from haploop.tools.advise.walls.trial import Store, Trial
+
+    kinds = registry([Path(plugin) for plugin in plugins])
+    subject = make_subject(str(device), hand, delay, estimator, texts(values), kinds)
+    try_out(elements_of(subject.scene), kinds)
+    with tempfile.TemporaryDirectory(prefix="haploop-") as scratch:
+        directory = Path(scratch if out is None else out)
+        directory.mkdir(parents=True, exist_ok=True)
+        with Trial(Store(directory / WALLS), workers, lambda runs: None) as trial:
+            return advice(subject, trial, lambda stage: None)
+
+
+def dissipate(
+    recording: str | Path,
+    *,
+    damping: Amounts = (),
+    mass: Amounts = (),
+    elements: Sequence[str] = (),
+    wall: float | str | None = None,
+    occupies: str = "below",
+    delay_s: float | None = None,
+    values: Iterable[str] = (),
+    plugins: Plugins = (),
+    **columns: Any,
+) -> Outcome:
+    """Tells what elements would have taken out of a recorded motion, which they do not change.
+
+    Args:
+        recording: CSV or TSV, directory of a run, or its log.
+        damping: of virtual damping, N s/m or text with a unit.
+        mass: of bi- and unidirectional inertia, kg or text.
+        elements: any other, ``"KIND KEY=VALUE ..."``.
+        wall: where a wall begins, m or text: elements act beyond it only; ``occupies`` says on which side, below or
+            above.
+        delay_s: age of a force as it acts; that of the run when None.
+        values: ``KEY=VALUE`` for [velocity], [acceleration] and [encoder].
+        plugins: files with elements.
+        columns: of a text file: position, time, velocity, acceleration, force by name or number; rate_Hz; their units
+            as length, time_unit, velocity_unit, acceleration_unit, force_unit.
+
+    Returns:
+        ``outcome.elements[0].true_J`` and so on; ``outcome.trace.lines()`` are the books over time, rows t, x, then
+        sampled and true books of every element.
+
+    Raises:
+        RecordingError, FileNotFoundError, LogError: the recording cannot be used.
+        SceneError, ElementError, PluginError: the selection is wrong.
+    """
+    from haploop.tools.dissipate.command import Request, Selection, compute_outcome
+    from haploop.tools.dissipate.text_recording import Layout
+
+    dampings, masses = ([str(plain(each)) for each in amounts] for amounts in (damping, mass))
+    place = None if wall is None else str(plain(wall))
+    selection = Selection(dampings, masses, list(elements), place, occupies, list(values))
+    request = Request(Path(recording), selection, Layout(**columns), delay_s)
+    return compute_outcome(request, registry([Path(plugin) for plugin in plugins]))
+
+
+def plot(what: Result | str | Path, target: str | Path | None = None) -> Path:
+    """Draws a run that has a directory, or the map of a sweep; returns the figure's file.
+
+    Args:
+        what: a result, or the directory of a run or a sweep.
+        target: file of the figure, in the format of its suffix; ``figure.png`` in the directory when None.
+
+    Raises:
+        ValueError: the run was kept in memory alone.
+        FigureError: there is nothing to draw, or matplotlib is not installed.
+    """
+    from haploop.tools.figure.run_figure import draw
+    from haploop.tools.sweep.map.figure import draw_map
+    from haploop.tools.sweep.table import is_sweep
+
+    directory = what.directory if isinstance(what, Result) else Path(what)
+    if directory is None:
+        raise ValueError(
+            "This run was kept in memory alone; give it a directory to be drawn from: run(scene, out=...)."
+        )
+    return (draw_map if is_sweep(directory) else draw)(directory, None if target is None else Path(target))
