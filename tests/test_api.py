@@ -26,7 +26,6 @@ def test_the_front_door_imports_nothing_before_it_is_used_and_tells_the_nearest_
     code = "import sys, haploop.api; print({'numpy', 'pydantic', 'zmq', 'mcap', 'pint', 'difflib'} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
     assert all(getattr(haploop.api, name) for name in haploop.api.__all__)
-    assert set(haploop.api.__all__) <= set(dir(haploop.api))
     with pytest.raises(AttributeError, match=r"no dissipat \(did you mean dissipate\?\)"):
         _ = haploop.api.dissipat
 
@@ -71,7 +70,6 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
         with pytest.raises(TimeoutError):
             loop.wait(0.01)
         assert loop.step(100) == 100
-        assert loop.time_s == pytest.approx(0.1)
         with pytest.raises(CommandRefused, match="did you mean damping"):
             loop.swap("dampin", damping=1.0)
         tick = loop.swap("unidirectional-inertia", mass="10 g")

@@ -55,7 +55,3 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"haploop.api has no {name}{meant(name, _HOMES)}; it has {', '.join(__all__)}.")
     module, _, attribute = _HOMES[name].rpartition(".")
     return getattr(import_module(f"haploop.{module}"), attribute)
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})

@@ -135,12 +135,6 @@ class LiveLoop:
         """Returns tick, end, pace, whether it is paused, and every node, as ``haploop status --json``."""
         return self._ask("status")
 
-    @property
-    def time_s(self) -> float:
-        """Simulated time up to which the logger has seen the run, s."""
-        now = self.status()
-        return now["tick"] / now["control_rate"]
-
     def set(self, values: Mapping[str, Any], at: float | None = None) -> int:
         """Changes numbers, ``{"wall.stiffness": "0.4 N/mm"}``, at once or at a simulated time; returns the tick."""
         return self._ask("set", set=plain(values), at=at)["tick"]

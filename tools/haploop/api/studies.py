@@ -42,8 +42,7 @@ def sweep(
         plugins: files with elements.
 
     Raises:
-        SceneError, PluginError: the sweep cannot be run.
-        NeedsPyarrow: pyarrow is not installed.
+        SceneError, PluginError, NeedsPyarrow: the sweep cannot be run, or pyarrow is not installed.
         OutputError, StoreError: the directory cannot be used.
     """
     from haploop.tools.sweep.command import Request, carry_out
@@ -82,16 +81,12 @@ def advise(
     Args:
         device: a device that ``haploop scenes`` lists, or a scene file.
         hand: a hand that it lists, a file with one, or "none".
-        delay: round trip, in s or text with its unit.
-        estimator: of the velocity, when not the scene's.
-        values: laid over device or scene, as in ``load``.
-        plugins: files with elements that the scene names.
-        workers: processes; one a core when None.
+        delay: round trip, in s or text with its unit; ``estimator`` is that of the velocity.
         out: directory in which every tried wall is kept, so that an advice that was interrupted goes on.
+        values, plugins, workers: as of ``sweep``.
 
     Raises:
-        InvalidRequest: a name is none.
-        SceneError, PluginError, ElementError: the scene cannot be run.
+        InvalidRequest, SceneError, PluginError, ElementError: a name is none, or the scene cannot be run.
     """
     from haploop.launch.scene.events import elements_of, try_out
     from haploop.tools.advise.advice import advice
@@ -129,11 +124,9 @@ def dissipate(
         damping: of virtual damping, N s/m or text with a unit.
         mass: of bi- and unidirectional inertia, kg or text.
         elements: any other, ``"KIND KEY=VALUE ..."``.
-        wall: where a wall begins, m or text: elements act beyond it only; ``occupies`` says on which side, below or
-            above.
+        wall: where a wall begins, m or text: elements act beyond it only, ``occupies`` says on which side.
         delay_s: age of a force as it acts; that of the run when None.
         values: ``KEY=VALUE`` for [velocity], [acceleration] and [encoder].
-        plugins: files with elements.
         columns: of a text file: position, time, velocity, acceleration, force by name or number; rate_Hz; their units
             as length, time_unit, velocity_unit, acceleration_unit, force_unit.
 
@@ -142,8 +135,7 @@ def dissipate(
         sampled and true books of every element.
 
     Raises:
-        RecordingError, FileNotFoundError, LogError: the recording cannot be used.
-        SceneError, ElementError, PluginError: the selection is wrong.
+        RecordingError, FileNotFoundError, LogError, SceneError, ElementError: the recording or selection is wrong.
     """
     from haploop.tools.dissipate.command import Request, Selection, compute_outcome
     from haploop.tools.dissipate.text_recording import Layout

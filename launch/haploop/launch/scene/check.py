@@ -16,20 +16,13 @@ from haploop.launch.plan.effects import all_effects
 from haploop.launch.scene.estimator_keys import check_estimators, check_filter
 from haploop.launch.scene.events import check_events
 from haploop.launch.scene.layers import KeyPath, Layers
-<<<<<<< HEAD
-from haploop.launch.scene.mistakes import Mistake, SceneError, nearest
-=======
-from haploop.launch.scene.mistakes import SceneError
->>>>>>> 8a452cd (add: haploop.api, the front door for Python, with the handle of a live run)
+from haploop.launch.scene.mistakes import Mistake, SceneError
 from haploop.launch.scene.models import Model, number_of, read_table, scene_model
 from haploop.launch.scene.schema import Schema, alternatives, schema_at, whole_schema
 from haploop.launch.scene.toml_writer import inline
 from haploop.launch.scene.unmodelled import check_hand
-<<<<<<< HEAD
 from haploop.launch.scene.wall_keys import check_spring, check_wall, with_defaults
-=======
 from haploop.protocol.names import nearest
->>>>>>> 8a452cd (add: haploop.api, the front door for Python, with the handle of a live run)
 from haploop.protocol.scene.scene import Clock, EventTable, Scene
 from haploop.protocol.scene.table import Tables
 from haploop.protocol.ticks import Timebase, TimebaseError
