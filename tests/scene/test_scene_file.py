@@ -1,9 +1,14 @@
 """Scene files: what extends what, who said what, and files that cannot be read."""
 
+import re
+import tomllib
+
 import pytest
 
+from haploop.launch.scene.bundled import bundled_folder
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.scene.reading.lines import outline
 from haploop.protocol.scene.hand_force import Constant, Sine, Trace
 from haploop.protocol.scene.scene import Device, Hand, Wall
 from helpers.scenes.least import LEAST_TOML, file_mistakes
@@ -65,10 +70,80 @@ def test_a_mistake_names_the_file_that_made_it(files, tmp_path):
     (tmp_path / "devices/base.toml").write_text(LEAST_TOML + "[encoder]\nresolution = -1.0\n[wall]\nposition = 0.0\n")
     path = files(**{"scenes/top": 'extends = "../devices/base.toml"\n[wall]\nstiffness = "soft"\n'})
     assert [line.split(" is ")[0] for line in file_mistakes(path, "wall.occupies=no")] == [
-        "devices/base.toml: encoder.resolution",
-        "scenes/top.toml: wall.stiffness",
+        "devices/base.toml:6: encoder.resolution",
+        "scenes/top.toml:3: wall.stiffness",
         "--set: wall.occupies",
     ]
+
+
+def test_every_mistake_has_its_line_and_keys_given_twice_do_not_hide_the_others(files):
+    path = files(
+        top="""duration = 1.0
+duration = 2.0  # again
+extends = 3
+
+[device]
+damping = 0.1
+"mass" = -1.0
+[hand.force]
+kind = "trace"
+time = [
+  0.0,
+  1.0, # not the end ]
+]
+force = [ [ 0.0 ],
+  1.0 ]
+[[dissipation]]
+kind = "damping"
+damping = 1.0
+[[dissipation]]
+kind = "damping"
+[device]
+velocity = "1 m"
+[wall]
+occupies = \"\"\"
+left\"\"\"
+position = 0.0
+"""
+    )
+    assert [told.split(" is ")[0] for told in file_mistakes(path)] == [
+        "top.toml:2: duration",
+        "top.toml:21: device",
+        "top.toml:3: extends",
+    ]
+    path.write_text(path.read_text().replace("extends = 3", ""))
+    assert sorted(told.split(" is ")[0] for told in file_mistakes(path)) == sorted(
+        [
+            "top.toml:2: duration",
+            "top.toml:21: device",
+            "top.toml:7: device.mass",
+            "top.toml:22: device.velocity",
+            "top.toml:14: hand.force.force.0",
+            "top.toml:19: dissipation.1.damping",
+            "top.toml:23: wall.stiffness",
+            "top.toml:24: wall.occupies",
+        ]
+    )
+
+
+def test_the_outline_of_every_shipped_scene_is_what_toml_reads():
+    for path in bundled_folder("scenes").parent.rglob("*.toml"):
+        text = path.read_text(encoding="utf-8")
+        found = outline(text)
+        assert found
+        assert found.data == tomllib.loads(text)
+        assert not found.doubled
+        for key, line in found.at.items():
+            assert re.search(rf"\b{re.escape(str([part for part in key if isinstance(part, str)][-1]))}\b",
+                             text.splitlines()[line - 1]), (path, key)  # fmt: skip
+
+
+def test_what_is_no_toml_has_no_outline_and_its_own_words():
+    assert outline("a = \n[b]\nb = 1\n") is None
+    assert outline("a = 1\n[a.b]\n") is None
+    doubled = outline("a = 1\na = 2\n")
+    assert doubled
+    assert doubled.doubled == [(("a",), 1, 2)]
 
 
 def test_a_scene_that_extends_itself_is_told_the_circle(files, tmp_path):
@@ -146,7 +221,7 @@ def test_a_recording_that_cannot_be_used_says_which_line(files, tmp_path, csv, s
     if csv is not None:
         (tmp_path / "push.csv").write_text(csv)
     path = files(top=LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\n')
-    assert file_mistakes(path) == [f'top.toml: hand.force.file is "push.csv". {sentence}']
+    assert file_mistakes(path) == [f'top.toml:7: hand.force.file is "push.csv". {sentence}']
 
 
 def test_a_trace_has_a_file_or_samples_but_not_both(files):

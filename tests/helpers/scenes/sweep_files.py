@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -58,11 +59,13 @@ def loaded(folder: Path, text: str = GRID, overrides: Sequence[str] = (), press:
 
 
 def mistakes(folder: Path, text: str, overrides: Sequence[str] = ()) -> list[str]:
-    """Returns the mistakes of such a file, without its name."""
+    """Returns the mistakes of such a file, without its name and their lines."""
     try:
         loaded(folder, text, overrides)
     except SceneError as error:
-        return [str(mistake).removeprefix(f"{folder / 'sweep.toml'}: ") for mistake in error.mistakes]
+        return [
+            str(replace(mistake, line=None)).removeprefix(f"{folder / 'sweep.toml'}: ") for mistake in error.mistakes
+        ]
     return []
 
 

@@ -11,8 +11,9 @@ import haploop.logger
 from haploop.controller.dissipation import Element, registry
 from haploop.controller.dissipation.element import hint_of
 from haploop.launch.scene.check import resolve
-from haploop.launch.scene.layers import Layers, parse
+from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import Mistake, SceneError
+from haploop.launch.scene.reading.tables import parse
 from haploop.launch.spec import SCENE
 from haploop.logger.log import LogError
 from haploop.logger.log.recording import Recording, Table

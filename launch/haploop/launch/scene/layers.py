@@ -10,17 +10,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from haploop.launch.scene.bundled import bundled, found
+from haploop.launch.scene.bundled import found
 from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, counted, shown
+from haploop.launch.scene.reading.lines import KeyPath, line_in
+from haploop.launch.scene.reading.tables import DEEPEST, excess, parse
 from haploop.launch.scene.toml_writer import inline
-from haploop.protocol.files import read_text
-from haploop.protocol.names import nearest
 from haploop.protocol.scene.table import Tables
 
-KeyPath = tuple[str | int, ...]
-# No scene needs tables deeper in one another than this, nor more files that extend one another, nor more keys outside
-# of lists; a thousand of them would end the program.
-_DEEPEST, _MOST_FILES, _MOST_KEYS = 32, 100, 2000
+# No scene needs more files that extend one another.
+_MOST_FILES = 100
 # Keys that say what else is in their table, each with the keys that are there whatever it says.
 _SORTS = {"kind": (), "estimator": ("source", "cutoff")}
 _OF_EVERY_KIND: dict[KeyPath, tuple[str, ...]] = {("wall",): ("position", "stiffness", "occupies")}
@@ -34,6 +32,7 @@ class Layers:
 
     Attributes:
         origins: the file, or ``"--set"``, that gave each value, and the last file that wrote into each table.
+        doubled: mistakes of keys that are given twice in one file, with which reading goes on.
         files: how many have been read.
     """
 
@@ -41,6 +40,7 @@ class Layers:
     data: Tables = field(default_factory=dict)
     origins: dict[KeyPath, str] = field(default_factory=dict)
     mistakes: list[Mistake] = field(default_factory=list)
+    doubled: list[Mistake] = field(default_factory=list)
     files: int = 0
 
     def origin(self, key: KeyPath) -> str:
@@ -54,8 +54,8 @@ class Layers:
         if given is None:
             given = f"is {_quoted(self.value(key))}"
         origin = self.origin(key)
-        file = origin if origin == COMMAND_LINE else shown(origin)
-        self.mistakes.append(Mistake(file, ".".join(map(str, key)), given, expected, nearest))
+        file, line = (origin, None) if origin == COMMAND_LINE else (shown(origin), line_in(origin, key))
+        self.mistakes.append(Mistake(file, ".".join(map(str, key)), given, expected, nearest, line))
 
     def value(self, key: KeyPath) -> Any:
         value: Any = self.data
@@ -109,7 +109,8 @@ def read_layers(path: Path) -> Layers:
     layers = Layers(path)
     _read(layers, path, ())
     if layers.mistakes:
-        raise SceneError(layers.mistakes)
+        raise SceneError([*layers.doubled, *layers.mistakes])
+    layers.mistakes += layers.doubled
     return layers
 
 
@@ -117,8 +118,8 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
     """Lays the file at ``path`` on, after what it extends."""
     here = Path(os.path.realpath(path))  # where links lead in a circle, reading the file says so
     layers.files += 1
-    if len(chain) > _DEEPEST or layers.files > _MOST_FILES:
-        many = f"At most {_DEEPEST} files that extend one another, and {_MOST_FILES} in all, were expected."
+    if len(chain) > DEEPEST or layers.files > _MOST_FILES:
+        many = f"At most {DEEPEST} files that extend one another, and {_MOST_FILES} in all, were expected."
         if layers.files <= _MOST_FILES + 1:
             layers.mistakes.append(Mistake(shown(path), "", "", many))
         return
@@ -127,7 +128,7 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
         layers.mistakes.append(Mistake(shown(chain[-1]), "", "", f"A scene cannot extend itself: {circle}."))
         return
     try:
-        table = parse(path)
+        table = parse(path, doubled=layers.doubled)
     except SceneError as error:
         layers.mistakes += error.mistakes
         return
@@ -135,63 +136,12 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
     names = [below] if isinstance(below, str) else below
     if not isinstance(names, list) or not all(isinstance(name, str) and name and "\0" not in name for name in names):
         expected = "It must be the path of a scene file, or a list of them."
-        layers.mistakes.append(Mistake(shown(path), "extends", f"is {_quoted(below)}", expected))
+        line = line_in(str(path), ("extends",))
+        layers.mistakes.append(Mistake(shown(path), "extends", f"is {_quoted(below)}", expected, line=line))
         return
     for name in names:
         _read(layers, found(Path(name), "scenes", path.parent), (*chain, here))
     layers.lay(table, str(path))
-
-
-def parse(path: Path, what: str = "scene", needs: str = "a duration and a [device]") -> Tables:
-    """Returns the tables of one TOML file, which is a ``what`` and needs some keys at least.
-
-    Raises SceneError where it is missing, empty, no file, no text or no TOML (with line and column).
-    """
-    try:
-        if not (table := tomllib.loads(read_text(path))):
-            problem = f"The file is empty; a {what} needs at least {needs}."
-        elif not (problem := _excess(table)):
-            return table
-    except FileNotFoundError:
-        problem = _absent(path, what)
-    except IsADirectoryError:
-        problem = f"This is a directory; a {what} is a TOML file."
-    except OSError as error:
-        problem = f"The file cannot be read: {error.strerror}."
-    except UnicodeDecodeError as error:
-        problem = f"A {what} must be UTF-8 text, but byte {error.start} is not."
-    except ValueError as error:
-        problem = f"This is not TOML: {error}."
-    except RecursionError:
-        problem = _TOO_DEEP
-    raise SceneError([Mistake(shown(path), "", "", problem)])
-
-
-def _absent(path: Path, what: str) -> str:
-    """Returns the sentence on a file that is not there; a name without folder may have been meant for a bundled one."""
-    names = bundled(f"{what}s")
-    meant = nearest(path.stem, names) if path.name == str(path) else None
-    hint = f", and no {what} of that name comes with haploop" if path.name == str(path) else ""
-    return f"There is no such file{hint}{f'; did you mean {meant}?' if meant else '.'}"
-
-
-_TOO_DEEP = f"Tables and lists may lie at most {_DEEPEST} deep in one another."
-
-
-def _excess(value: Any) -> str:
-    """Returns what there is too much of in a value that was read, as a sentence; "" for nothing."""
-    level, depth = [value], 0
-    while level:
-        inner = [one for node in level for one in (node.values() if isinstance(node, dict) else node)]
-        level, depth = [one for one in inner if isinstance(one, dict | list)], depth + 1
-        if depth > _DEEPEST:
-            return _TOO_DEEP
-    keys = _count_keys(value)
-    return f"There are {keys} keys, and {_MOST_KEYS} at most were expected." if keys > _MOST_KEYS else ""
-
-
-def _count_keys(value: Any) -> int:
-    return len(value) + sum(map(_count_keys, value.values())) if isinstance(value, dict) else 0
 
 
 def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:
@@ -250,7 +200,7 @@ def key_path(name: str) -> tuple[str, ...]:
     while isinstance(node, dict) and node:
         [(part, node)] = node.items()
         path.append(part)
-    return tuple(path) if len(path) <= _DEEPEST else ()
+    return tuple(path) if len(path) <= DEEPEST else ()
 
 
 def split_assignment(text: str) -> tuple[str, Any] | None:
@@ -262,7 +212,7 @@ def split_assignment(text: str) -> tuple[str, Any] | None:
         table = tomllib.loads(f"value = {value}")
     except (ValueError, RecursionError):
         return name.strip(), value.strip()
-    return name.strip(), table["value"] if len(table) == 1 and not _excess(table) else value.strip()
+    return name.strip(), table["value"] if len(table) == 1 and not excess(table) else value.strip()
 
 
 def _quoted(value: Any) -> str:

@@ -22,6 +22,7 @@ class Mistake:
         given: what was found there ("is -3.0", "is missing", "is not a key of [wall]").
         expected: what is allowed, a full sentence.
         nearest: the allowed name that comes nearest to the one given.
+        line: of the file, from 1; None where it has none, as what --set gives.
     """
 
     file: str
@@ -29,9 +30,11 @@ class Mistake:
     given: str
     expected: str
     nearest: str | None = None
+    line: int | None = None
 
     def __str__(self) -> str:
-        where = f"{self.file}: " if self.file else ""
+        place = f"{self.file}:{self.line}" if self.line else self.file
+        where = f"{place}: " if place else ""
         if not self.key:
             return f"{where}{self.expected}"
         hint = f"; did you mean {self.nearest}?" if self.nearest else "."

@@ -15,10 +15,12 @@ from haploop.launch.runs.loaded_scene import texts
 from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.bundled import found
 from haploop.launch.scene.check import complain
-from haploop.launch.scene.layers import KeyPath, Layers, key_path, lay_overrides, parse
+from haploop.launch.scene.layers import KeyPath, Layers, key_path, lay_overrides
 from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError, shown
 from haploop.launch.scene.models import Model
 from haploop.launch.scene.number import Number, si
+from haploop.launch.scene.reading.lines import line_in
+from haploop.launch.scene.reading.tables import parse
 from haploop.launch.scene.schema import TomlSchema
 from haploop.protocol.names import nearest
 from haploop.protocol.quantity import Quantity
@@ -117,7 +119,8 @@ class _Reader:
         except SceneError as error:
             for mistake in error.mistakes:
                 if mistake.file == COMMAND_LINE and mistake.key in self._changes:
-                    mistake = replace(mistake, file=shown(self._layers.path), key=f"set.{mistake.key}")
+                    path, line = self._layers.path, line_in(str(self._layers.path), ("set", mistake.key))
+                    mistake = replace(mistake, file=shown(path), key=f"set.{mistake.key}", line=line)
                 self._layers.mistakes.append(mistake)
         except TypeError as error:  # a value that no scene holds, such as a date
             self._layers.complain(("set",), str(error), "cannot be used")

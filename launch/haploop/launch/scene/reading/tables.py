@@ -1,0 +1,96 @@
+"""The tables of one TOML file, or the sentence on why there are none."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from haploop.launch.scene.bundled import bundled
+from haploop.launch.scene.mistakes import Mistake, SceneError, shown
+from haploop.launch.scene.reading.lines import outline
+from haploop.protocol.files import read_text
+from haploop.protocol.names import nearest
+from haploop.protocol.scene.table import Tables
+
+# No scene needs tables deeper in one another than this, nor more keys outside of lists; a thousand of them would end
+# the program.
+DEEPEST, _MOST_KEYS = 32, 2000
+
+
+def parse(
+    path: Path,
+    what: str = "scene",
+    needs: str = "a duration and a [device]",
+    doubled: list[Mistake] | None = None,
+) -> Tables:
+    """Returns the tables of one TOML file, which is a ``what`` and needs some keys at least.
+
+    Keys that are given twice are added to ``doubled``, where that is given, and the first value is taken.
+
+    Raises SceneError where it is missing, empty, no file, no text or no TOML (with line and column).
+    """
+    try:
+        text = read_text(path)
+        try:
+            table = tomllib.loads(text)
+        except ValueError:
+            table = _with_the_first(path, text, [] if doubled is None else doubled)
+            if table is None or doubled is None:
+                raise
+        if not table:
+            problem = f"The file is empty; a {what} needs at least {needs}."
+        elif not (problem := excess(table)):
+            return table
+    except FileNotFoundError:
+        problem = _absent(path, what)
+    except IsADirectoryError:
+        problem = f"This is a directory; a {what} is a TOML file."
+    except OSError as error:
+        problem = f"The file cannot be read: {error.strerror}."
+    except UnicodeDecodeError as error:
+        problem = f"A {what} must be UTF-8 text, but byte {error.start} is not."
+    except ValueError as error:
+        problem = f"This is not TOML: {error}."
+    except RecursionError:
+        problem = _TOO_DEEP
+    raise SceneError([Mistake(shown(path), "", "", problem)])
+
+
+def _with_the_first(path: Path, text: str, doubled: list[Mistake]) -> Tables | None:
+    """Returns the tables of a text that is TOML but for keys given twice, which are added; None of any other."""
+    found = outline(text)
+    if found is None or not found.doubled:
+        return None
+    expected = "Leave one of the two out."
+    for key, first, again in found.doubled:
+        given = f"is given again, after line {first}"
+        doubled.append(Mistake(shown(path), ".".join(map(str, key)), given, expected, line=again))
+    return found.data
+
+
+def _absent(path: Path, what: str) -> str:
+    """Returns the sentence on a file that is not there; a name without folder may have been meant for a bundled one."""
+    names = bundled(f"{what}s")
+    meant = nearest(path.stem, names) if path.name == str(path) else None
+    hint = f", and no {what} of that name comes with haploop" if path.name == str(path) else ""
+    return f"There is no such file{hint}{f'; did you mean {meant}?' if meant else '.'}"
+
+
+_TOO_DEEP = f"Tables and lists may lie at most {DEEPEST} deep in one another."
+
+
+def excess(value: Any) -> str:
+    """Returns what there is too much of in a value that was read, as a sentence; "" for nothing."""
+    level, depth = [value], 0
+    while level:
+        inner = [one for node in level for one in (node.values() if isinstance(node, dict) else node)]
+        level, depth = [one for one in inner if isinstance(one, dict | list)], depth + 1
+        if depth > DEEPEST:
+            return _TOO_DEEP
+    keys = _count_keys(value)
+    return f"There are {keys} keys, and {_MOST_KEYS} at most were expected." if keys > _MOST_KEYS else ""
+
+
+def _count_keys(value: Any) -> int:
+    return len(value) + sum(map(_count_keys, value.values())) if isinstance(value, dict) else 0
