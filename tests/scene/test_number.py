@@ -19,6 +19,9 @@ from helpers.scenes.least import mistakes, scene
     ("text", "unit", "value"),
     [
         ("0.15 N/mm", "N/m", 150.0),
+        ("0.2 m / 4096", "m", 0.2 / 4096),
+        ("200 / 4096 mm", "m", 0.2 / 4096),
+        ("1/3 N/mm/2", "N/m", 1000.0 / 6.0),
         ("-60 mm", "m", -0.060),
         ("0.0008 N s/mm", "N s/m", 0.8),
         ("2 ms", "s", 0.002),

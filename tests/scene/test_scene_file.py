@@ -234,3 +234,47 @@ def test_the_error_is_a_value_error_with_one_line_a_mistake(files):
     with pytest.raises(SceneError) as error:
         load(files(top="seed = -1\n"))
     assert len(str(error.value).splitlines()) == len(error.value.mistakes) == 3
+
+
+@pytest.mark.parametrize(
+    ("csv", "times", "forces"),
+    [
+        ("t (ms), F [mN]\n0,0\n500,-1500\n", (0.0, 0.5), (0.0, -1.5)),
+        ("time,force (N)\n0,0\n500,-1500\n", (0.0, 500.0), (0.0, -1500.0)),
+    ],
+)
+def test_units_in_the_header_of_a_recorded_force_are_read(files, tmp_path, csv, times, forces):
+    (tmp_path / "push.csv").write_text(csv)
+    path = files(top=LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\n')
+    assert load(path).hand == Hand(force=Trace(time=times, force=forces))
+    (tmp_path / "push.csv").write_text(csv.replace("F [mN]", "m (g)").replace("force (N)", "m (kg)"))
+    [mistake] = file_mistakes(path)
+    assert "Line 1, the header of time and force:" in mistake
+    assert "has the dimension [mass]" in mistake
+
+
+COUNTED = LEAST_TOML + '[encoder]\nbits = 14\nrange = "0.2 m"\n'
+
+
+def test_bits_and_range_of_an_encoder_are_its_resolution_whichever_is_said_last(files):
+    path = files(top=COUNTED, over='extends = "top.toml"\n[encoder]\nresolution = 1e-6\n')
+
+    def count_m(name, *overrides):
+        return load(path.parent / f"{name}.toml", overrides).as_dict()["encoder"]["resolution"]
+
+    assert count_m("top") == 0.2 / 2**14 == count_m("top", "encoder.resolution=0.2 m / 16384")
+    assert count_m("top", "encoder.bits=10") == 0.2 / 1024
+    assert count_m("over") == 1e-6
+    assert count_m("over", "encoder.range=1", "encoder.bits=2") == 0.25
+
+
+def test_an_encoder_has_its_resolution_or_both_bits_and_range(files):
+    path = files(top=COUNTED)
+    assert file_mistakes(path, "encoder.bits=0.5")[0].startswith("--set: encoder.bits is 0.5. It must be at least 1.")
+    assert file_mistakes(path, "encoder.range=-1")[0].startswith("--set: encoder.range is -1. It must be above 0 m.")
+    path.write_text(COUNTED.replace("bits = 14\n", ""))
+    assert file_mistakes(path) == [
+        "top.toml:5: encoder.bits is missing. An encoder has its resolution, or both bits and range."
+    ]
+    path.write_text(COUNTED + "resolution = 1e-6\n")
+    assert file_mistakes(path)[0].startswith("top.toml:8: encoder.resolution stands beside bits or range.")

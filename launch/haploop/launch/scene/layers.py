@@ -22,6 +22,10 @@ _MOST_FILES = 100
 # Keys that say what else is in their table, each with the keys that are there whatever it says.
 _SORTS = {"kind": (), "estimator": ("source", "cutoff")}
 _OF_EVERY_KIND: dict[KeyPath, tuple[str, ...]] = {("wall",): ("position", "stiffness", "occupies")}
+# Keys of a table that stand for others of it: a file that gives the one takes away the others.
+_INSTEAD: dict[KeyPath, dict[str, set[str]]] = {
+    ("encoder",): {"resolution": {"bits", "range"}, "bits": {"resolution"}, "range": {"resolution"}}
+}
 # Tables of which one that names no kind is of a kind, too.
 _KINDLESS = [("hand",)]
 
@@ -75,6 +79,10 @@ class Layers:
                 for name in [n for n in under if n not in common and self.origins.get((*key, n)) != origin]:
                     self._forget((*key, name))
                     del under[name]
+        instead = set[str]().union(*(others for name, others in _INSTEAD.get(key, {}).items() if name in over))
+        for name in instead & under.keys() - over.keys():
+            self._forget((*key, name))
+            del under[name]
         if origin != COMMAND_LINE or key not in self.origins:
             self.origins[key] = origin
         for name, value in over.items():

@@ -5,6 +5,7 @@ Text with a unit is converted in decimal arithmetic: ``"-60 mm"`` is exactly -0.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from decimal import Decimal
@@ -93,21 +94,60 @@ _NUMBER = r"[+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
 # Products, quotients, one-digit powers and roots of names: no more of arithmetic is let through to pint, which would
 # do it.
 _FACTOR = r"(?:[^\W\d]\w*|%|°)(?:(?:\*\*|\^)-?(?:0\.5|\d)|⁻?[¹²³⁴])?"
-_TEXT = re.compile(rf"\s*({_NUMBER})\s*({_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*)?\s*")
+_UNIT = rf"{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*"
+# One division by a number, after the amount or after its unit.
+_TEXT = re.compile(rf"\s*({_NUMBER})\s*(?:/\s*({_NUMBER})\s*)?({_UNIT})?\s*(?:/\s*({_NUMBER})\s*)?")
 
 
 def from_text(text: str, target: str) -> Decimal:
-    """Returns the number that ``text``, such as ``"0.15 N/mm"``, is in the unit ``target``.
+    """Returns the number that ``text``, such as ``"0.15 N/mm"`` or ``"0.2 m / 4096"``, is in the unit ``target``.
 
     Raises ValueError with a full sentence that says why it is none.
     """
     match = _TEXT.fullmatch(text)
     if not match:
         raise ValueError(f'It must be a number and its unit, such as "1 {target or "%"}".')
-    amount, unit = match[1], match[2] or ""
+    amount, before, unit, after = match[1], Decimal(match[2] or 1), match[3] or "", Decimal(match[4] or 1)
+    if not before * after:
+        raise ValueError("A number cannot be divided by 0.")
     if unit or not target:
-        return _convert(Decimal(amount), unit, target)
+        return _convert(Decimal(amount) / before / after, unit, target)
     raise ValueError(f'Text must carry a unit, such as "{amount} {target}"; a number without one is written unquoted.')
+
+
+_IN_BRACKETS = re.compile(r"(.*?)\s*[(\[]([^)\]]*)[)\]]\s*")
+
+
+def name_and_unit(head: str) -> tuple[str, str]:
+    """Returns the name of a column and the unit in its brackets, "" for none: ``"t (ms)"``, ``"force [mN]"``."""
+    match = _IN_BRACKETS.fullmatch(head)
+    return (match[1].strip(), match[2].strip()) if match else (head.strip(), "")
+
+
+def scale_of(unit: str, target: str) -> float:
+    """Returns what numbers in a unit are multiplied by to be in ``target``; 1 for "".
+
+    Raises ValueError with a full sentence where the unit is none, or of another dimension. A number stands for itself.
+    """
+    if not unit:
+        return 1.0
+    if is_number(unit):
+        if not math.isfinite(number := float(unit)) or not number:
+            raise ValueError(f"A unit cannot be {unit} {target}.")
+        return number
+    try:
+        return float(from_text(f"1 {unit}", target))
+    except ValueError as error:
+        raise ValueError(f"{unit!r} is no unit for numbers in {target}: {error}") from error
+
+
+def is_number(text: str) -> bool:
+    """Tells whether a text is a number, nan and inf among them."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 # The units that texts are mostly written in: exponents of kg, m, s and rad, and the factor to them. Pint knows every
@@ -153,7 +193,7 @@ def _exact(unit: str) -> tuple[Exponents, Decimal] | None:
 def is_exotic(text: str) -> bool:
     """Tells whether a text is a number with a unit that pint alone may know."""
     match = _TEXT.fullmatch(text)
-    return bool(match) and _exact(match[2] or "") is None
+    return bool(match) and _exact(match[3] or "") is None
 
 
 def _dimension(exponents: Exponents) -> str:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from haploop.launch.scene.models import scene_model
+from haploop.launch.scene.models import model_of, scene_model
+from haploop.launch.scene.reading.shorthand import CountedRange
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -58,8 +59,10 @@ def whole_schema(kinds: Mapping[str, type[Element]]) -> Schema:
 @lru_cache(maxsize=4)
 def _whole_schema(kinds: tuple[tuple[str, type[Element]], ...]) -> Schema:
     schema = scene_model(dict(kinds)).model_json_schema(schema_generator=TomlSchema)
-    recording = {"type": "string", "description": "a CSV of time in s and force in N, in place of time and force"}
-    schema["$defs"]["Trace"]["properties"]["file"] = recording
+    about = "a CSV of time and force, in s and N or in the units of its header's brackets, in place of time and force"
+    schema["$defs"]["Trace"]["properties"]["file"] = {"type": "string", "description": about}
+    counted = model_of(CountedRange).model_json_schema(schema_generator=TomlSchema)
+    schema["$defs"]["Encoder"]["properties"] |= counted["properties"]
     return schema
 
 

@@ -53,7 +53,10 @@ class MinimumJerk(Table):
 
 
 class Trace(Table):
-    """Recorded samples, joined by straight lines, held before the first and after the last."""
+    """Recorded samples, joined by straight lines, held before the first and after the last.
+
+    A scene file gives the lists time and force, or as ``file`` the path of a CSV of two columns, relative to its own.
+    """
 
     kind = "trace"
     time: tuple[Annotated[float, si("s", "time of the sample, later than the one before")], ...]

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
     from haploop.protocol.scene.scene import Scene
 
+# More samples of a recorded force than this are not printed to a terminal.
+_MOST_PRINTED = 20
+
 
 def check(
     scene: Annotated[Path | None, typer.Argument(help="scene file (TOML)", show_default=False)] = None,
@@ -55,7 +58,12 @@ def check(
     if json:
         print_json({**resolved.as_dict(), "notes": noted})
     else:
-        print(to_toml(resolved.as_dict()), end="")
+        tables = resolved.as_dict()
+        force = tables.get("hand", {}).get("force", {})
+        if sys.stdout.isatty() and len(force.get("time", ())) > _MOST_PRINTED:  # into a file goes all of it
+            for name in ("time", "force"):
+                force[name] = f"{len(force[name])} numbers from {min(force[name]):g} to {max(force[name]):g}"
+        print(to_toml(tables), end="")
         with_a = " with a plant of yours (--node plant=COMMAND)" if hand_is_unmodelled(resolved) else ""
         print(f"{scene} can be run{with_a}.", file=sys.stderr)
 

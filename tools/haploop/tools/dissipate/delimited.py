@@ -9,19 +9,18 @@ from __future__ import annotations
 import contextlib
 import csv
 import itertools
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from haploop.launch.scene.number import is_number, name_and_unit
 from haploop.protocol.files import demand_regular
 from haploop.protocol.names import nearest
 from haploop.tools.dissipate.samples import Floats, RecordingError
 
 _BLOCK_ROWS = 16_384
-_UNIT = re.compile(r"(.*?)\s*[(\[]([^)\]]*)[)\]]\s*")
 
 
 @dataclass(frozen=True)
@@ -144,14 +143,4 @@ def _open_lines(path: Path) -> Iterator[Iterator[str]]:
 
 
 def _column(index: int, cell: str) -> Column:
-    match = _UNIT.fullmatch(cell)
-    return Column(index, match[1].strip(), match[2].strip()) if match else Column(index, cell.strip(), "")
-
-
-def is_number(text: str) -> bool:
-    """Tells whether a text is a number, nan and inf among them."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return Column(index, *name_and_unit(cell))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from haploop.launch.scene.number import from_text
-from haploop.tools.dissipate.delimited import Column, DelimitedFile, is_number
+from haploop.launch.scene.number import scale_of
+from haploop.tools.dissipate.delimited import Column, DelimitedFile
 from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
 
 # Names of columns that are looked for where none is given.
@@ -103,7 +102,10 @@ class TextRecording:
                     f"In which unit is the {what} in column {column.name}? --unit is that of the position alone; "
                     f"give --{what}-unit, such as {si}."
                 )
-            scales[what] = _scale(unit or column.unit, si)
+            try:
+                scales[what] = scale_of(unit or column.unit, si)
+            except ValueError as error:
+                raise RecordingError(str(error)) from error
         return columns, scales
 
     @staticmethod
@@ -209,17 +211,3 @@ class TextRecording:
                 f"Line {lines[at]:.0f} of {self._file.path}: the times must increase, but {t[at]:.9g} s follows "
                 f"{before:.9g} s; sort the rows, or give the rate with --rate if they are in order."
             )
-
-
-def _scale(unit: str, si: str) -> float:
-    if not unit:
-        return 1.0
-    try:
-        if is_number(unit):
-            number = float(unit)
-            if not (math.isfinite(number) and number):
-                raise RecordingError(f"A unit cannot be {unit} {si}.")
-            return number
-        return float(from_text(f"1 {unit}", si))
-    except ValueError as error:
-        raise RecordingError(f"{unit!r} is no unit for numbers in {si}: {error}") from error

@@ -1,0 +1,70 @@
+"""Keys of a scene file that stand for others: the file of a recorded force, range and bits of an encoder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic_core import PydanticCustomError
+
+from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.mistakes import COMMAND_LINE
+from haploop.launch.scene.models import number_of
+from haploop.launch.scene.reading.trace import TraceError, read_trace
+from haploop.protocol.quantity import si
+from haploop.protocol.scene.table import Table
+
+
+class CountedRange(Table):
+    """The range of an encoder and its bits, in place of its resolution, which is range / 2^bits."""
+
+    bits: Annotated[int, si("", "there are 2^bits counts over the range", whole=True, at_least=1, at_most=64)]
+    range: Annotated[float, si("m", "way that the counts cover", above=0)]
+
+
+def put_in_full(layers: Layers) -> None:
+    """Puts the keys that a resolved scene has in place of those that stand for them; mistakes go to ``layers``."""
+    _read_recording(layers)
+    _count_range(layers)
+
+
+def _count_range(layers: Layers) -> None:
+    encoder = layers.data.get("encoder")
+    names = [field.name for field in CountedRange.fields()]
+    if not isinstance(encoder, dict) or not encoder.keys() & set(names):
+        return
+    expected, read = "An encoder has its resolution, or both bits and range.", dict[str, Any]()
+    for name in names:
+        try:
+            read[name] = number_of(CountedRange, name).read(encoder[name])
+        except KeyError:
+            layers.complain(("encoder", name), expected, "is missing")
+        except PydanticCustomError as error:
+            layers.complain(("encoder", name), error.message())
+    if "resolution" in encoder:
+        layers.complain(("encoder", "resolution"), expected, "stands beside bits or range")
+    count_m = read["range"] / 2 ** read["bits"] if len(read) == 2 else encoder.get("resolution", 1.0)
+    layers.lay({"resolution": count_m}, layers.origin(("encoder",)), ("encoder",))
+
+
+def _read_recording(layers: Layers) -> None:
+    """Puts the samples of a recorded hand force in place of its file, so that the scene runs by itself."""
+    hand = layers.data.get("hand")
+    force = hand.get("force") if isinstance(hand, dict) else None
+    if not isinstance(force, dict) or force.get("kind") != "trace" or "file" not in force:
+        return
+    key = ("hand", "force", "file")
+    times, forces = [0.0], [0.0]
+    if "time" in force or "force" in force:
+        layers.complain(key, "A trace has either a file or the lists time and force.")
+    elif not isinstance(force["file"], str):
+        layers.complain(key, "It must be the path of a CSV file of time and force.")
+    else:
+        origin = layers.origin(key)
+        folder = Path() if origin == COMMAND_LINE else Path(origin).parent
+        try:
+            times, forces = read_trace(folder / force["file"])
+        except TraceError as error:
+            layers.complain(key, str(error))
+    del force["file"]
+    force |= {"time": times, "force": forces}
