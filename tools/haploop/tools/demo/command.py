@@ -19,7 +19,7 @@ def demo(
         "runs"
     ),
 ) -> None:
-    """Tell in a few seconds how a wall buzzes, why, and which element steadies it, swapped in in mid-contact.
+    """Tell in seconds how a wall buzzes, why, and what steadies it. It is swapped in in mid-contact.
 
     Plant, controller and logger run as three processes. The last line names the figure's file.
     """
