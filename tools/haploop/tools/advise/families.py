@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import Literal
 
 from haploop.protocol.scene.scene import ElementTable, Hand, Scene
 from haploop.tools.render.units import fixed
@@ -16,15 +17,22 @@ _COUNT, FACTOR, _OF_BOTH = 7, 2.0, (1.0, 0.5, 0.25)
 
 @dataclass(frozen=True)
 class Family:
-    """One element, or two together, by its name and the kind and parameter of each."""
+    """One element, or two together, by its name and the kind and key of each parameter that is searched.
+
+    Attributes:
+        acts: as of a scene's element.
+    """
 
     name: str
     parts: tuple[tuple[str, str], ...]
+    acts: Literal["in-contact", "always"] = "in-contact"
 
     def elements(self, values: Values) -> tuple[ElementTable, ...]:
         """Returns the tables of a scene."""
-        pairs = zip(self.parts, values, strict=True)
-        return tuple(ElementTable(name=kind, parameters={key: value}) for (kind, key), value in pairs)
+        tables: dict[str, dict[str, float]] = {}
+        for (kind, key), value in zip(self.parts, values, strict=True):
+            tables.setdefault(kind, {})[key] = value
+        return tuple(ElementTable(name=kind, acts=self.acts, parameters=of) for kind, of in tables.items())
 
     def words(self, values: Values) -> str:
         """Formats the parameters: ``0.6 N s/m`` or ``9 g``; a dash for none."""
@@ -32,16 +40,20 @@ class Family:
 
     def phrase(self, values: Values) -> str:
         """Formats the parameters for a sentence: ``0.6 N s/m of damping``."""
-        told = zip(self._amounts(values), self.parts, strict=True)
-        return " and ".join(f"{words} of {kind.replace('-', ' ')}" for words, (kind, _) in told) or "no element"
+        told: dict[str, list[str]] = {}
+        for words, (kind, _) in zip(self._amounts(values), self.parts, strict=True):
+            told.setdefault(kind, []).append(words)
+        return " and ".join(f"{', '.join(of)} of {kind.replace('-', ' ')}" for kind, of in told.items()) or "no element"
 
     def _amounts(self, values: Values) -> list[str]:
-        def words(value: float, key: str) -> str:
-            if key == "damping":
-                return f"{value:.2g} N s/m"
-            return f"{fixed(value * 1e3, 2)} g" if value < 1.0 else f"{fixed(value, 2)} kg"
+        return [_format(value, key) for (_, key), value in zip(self.parts, values, strict=True)]
 
-        return [words(value, key) for (_, key), value in zip(self.parts, values, strict=True)]
+
+def _format(value: float, key: str) -> str:
+    if key == "mass":
+        return f"{fixed(value * 1e3, 2)} g" if value < 1.0 else f"{fixed(value, 2)} kg"
+    number = {"damping": f"{value:.2g} N s/m", "time": f"{fixed(value * 1e3, 2)} ms", "share": f"{value * 100:.2g} %"}
+    return number.get(key) or f"{fixed(value / 1e3, 2)} N/mm"
 
 
 NOTHING = Family("nothing", ())
@@ -51,17 +63,66 @@ UNIDIRECTIONAL = Family("unidirectional inertia", (("unidirectional-inertia", "m
 BOTH = Family("damping and unidirectional inertia", DAMPING.parts + UNIDIRECTIONAL.parts)
 SINGLE = (DAMPING, BIDIRECTIONAL, UNIDIRECTIONAL)
 FAMILIES = (NOTHING, *SINGLE, BOTH)
+ADAPTIVE_DAMPING = Family("adaptive damping", (("passivity-controller", "damping"),))
+ADAPTIVE_INERTIA = Family("adaptive inertia", (("adaptive-inertia", "mass"),))
+ADAPTIVE_BOTH = Family("adaptive damping and inertia", (("adaptive-inertia", "damping"), ("adaptive-inertia", "mass")))
+FORCE_BOUNDING = Family("force bounding", (("force-bounding", "share"),), "always")
+# Every stabilizer that comes with haploop, in the order in which tables list them.
+STABILIZERS = (
+    NOTHING,
+    DAMPING,
+    Family("damping on the way in", (("unidirectional-damping", "damping"),)),
+    BIDIRECTIONAL,
+    UNIDIRECTIONAL,
+    BOTH,
+    ADAPTIVE_DAMPING,
+    Family("adaptive damping, reset", (("passivity-controller-reset", "damping"),)),
+    Family("adaptive damping, reference", (("passivity-controller-reference", "damping"),)),
+    ADAPTIVE_INERTIA,
+    ADAPTIVE_BOTH,
+    FORCE_BOUNDING,
+    Family("force rate", (("force-rate", "time"),)),
+    Family(
+        "virtual coupling",
+        (("virtual-coupling", "stiffness"), ("virtual-coupling", "damping"), ("virtual-coupling", "mass")),
+        "always",
+    ),
+)
 
 
 def first_choices(family: Family, loop: Scene) -> list[Values]:
     """Returns parameters from about the largest that a loop can bear down: B = m / (T/2 + td), or the moved mass."""
     [(_, key)] = family.parts
-    hand = loop.hand or Hand()
-    most = loop.device.mass + (loop.transmission.motor_mass if loop.transmission else 0.0)
-    most += 0.0 if hand.grip else hand.mass
-    if key == "damping":
-        most /= 0.5 / loop.clock.control_rate + loop.clock.round_trip_delay
+    most = _moved_kg(loop) if key == "mass" else _most_damping(loop)
     return [(_rounded(most / FACTOR**i),) for i in range(_COUNT)]
+
+
+def box(family: Family, loop: Scene, alone_N_m: float) -> list[tuple[float, float]]:
+    """Returns between which values each parameter of a family is searched, given the stiffest wall without any.
+
+    Damping to twice what a loop can bear, B = 2 m / (T/2 + td); inertia to the moved mass; a coupling to 32 times as
+    stiff as that wall; a force's lead to four ticks and the delay.
+    """
+    period_s = 1.0 / loop.clock.control_rate
+    damping, moved = _most_damping(loop), _moved_kg(loop)
+    ends = {
+        "damping": (damping / 128.0, damping * 2.0),
+        "mass": (moved / 1024.0, moved),
+        "stiffness": (alone_N_m / 4.0, alone_N_m * 32.0),
+        "time": (period_s / 8.0, 4.0 * period_s + loop.clock.round_trip_delay),
+        "share": (1.0 / 64.0, 1.0),
+    }
+    return [ends[key] for _, key in family.parts]
+
+
+def _moved_kg(loop: Scene) -> float:
+    hand = loop.hand or Hand()
+    motor = loop.transmission.motor_mass if loop.transmission else 0.0
+    return loop.device.mass + motor + (0.0 if hand.grip else hand.mass)
+
+
+def _most_damping(loop: Scene) -> float:
+    return _moved_kg(loop) / (0.5 / loop.clock.control_rate + loop.clock.round_trip_delay)
 
 
 def beside(values: Values) -> list[Values]:

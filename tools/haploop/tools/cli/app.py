@@ -14,6 +14,7 @@ from haploop.tools.cli.run_command import run
 from haploop.tools.cli.scenes import check, export, judge, plot, plugins, replay
 from haploop.tools.cli.study_commands import advise, dissipate, paper, sweep
 from haploop.tools.cli.view import view
+from haploop.tools.compare.command import compare
 from haploop.tools.cost.command import cost
 from haploop.tools.demo.command import demo
 from haploop.tools.fmu.command import export_fmu
@@ -47,6 +48,7 @@ def haploop(
 for command in (
     demo, run, scenes, new, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, undo, attach,
     view, keys, join, plot, replay, judge, export, export_fmu, cost, sweep, dissipate, paper, advise,
+    compare,
 ):  # fmt: skip
     settings = {"ignore_unknown_options": True} if command in (step, pace) else None  # -1 is a number there
     app.command(command.__name__.rstrip("_").replace("_", "-"), context_settings=settings)(command)

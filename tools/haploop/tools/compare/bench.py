@@ -1,0 +1,236 @@
+"""One stabilizer on one loop: tuned on conditions of its own, then tried under other seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.advise.changes import scaled
+from haploop.tools.advise.families import STABILIZERS, Family, Values, box
+from haploop.tools.advise.report import describe
+from haploop.tools.advise.walls.cases import ranges
+from haploop.tools.advise.walls.limit import LEAST_N_M, MOST_N_M, Query, ladder, limits
+from haploop.tools.advise.walls.trial import Failure, Store, Trial
+from haploop.tools.compare.conditions import draw
+from haploop.tools.compare.rendered import Rendered, rendered
+
+# How closely limits are found while parameters are compared, and then.
+_ROUGH, CLOSE = 0.15, 0.06
+# Rungs of the tuning, as multiples of the wall without any element: softer walls have to bear everything, too.
+_RUNGS = (0.3, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0)
+# Rungs of a trial, as multiples of the limit in the tuning.
+_ABOUT = (0.15, 0.45, 0.7, 0.85, 1.0, 1.2, 1.5)
+# Bases of the Halton sequence, and the shares of a box's logarithmic axes that are searched through the best.
+_BASES, _ALONG = (2, 3, 5), (0.8, 0.2)
+# A wall of which less than this share is rendered is hidden by its element: softer ones are measured, too.
+_HIDDEN, _HALVINGS = 0.5, 16
+# What is 20 % off, together, to tell how sensitive the wall is to the device.
+_DEVICE = ("device.mass", "device.damping", "friction.kinetic", "transmission.stiffness")
+OFF = (0.8, 1.2)
+
+Ends = tuple[float, float]
+Tune = Callable[[Sequence[Values]], dict[Values, "Trying"]]
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is spent on every stabilizer alike.
+
+    Attributes:
+        points: parameters tried in the whole box, then along its axes through the best, then closer to it.
+        cases: of the tuning.
+        seeds: each draws ``of_seed`` cases.
+    """
+
+    points: int = 5
+    cases: int = 4
+    seeds: int = 6
+    of_seed: int = 3
+
+
+@dataclass(frozen=True)
+class Job:
+    """A stabilizer to be tuned and tried.
+
+    Attributes:
+        alone_N_m: about the stiffest wall without any.
+        block: the seeds that it is tuned and tried by; blocks share none.
+        sensitive: whether its sensitivity is measured.
+    """
+
+    loop: Scene
+    family: str
+    alone_N_m: float
+    block: int
+    effort: Effort
+    sensitive: bool = True
+
+
+class Trying(NamedTuple):
+    """The wall of which most is rendered, of those that bear everything.
+
+    Attributes:
+        limit_N_m: the stiffest that does; 0 where none does.
+        wall_N_m: the one measured, the same but where the element hides it.
+    """
+
+    limit_N_m: float
+    wall_N_m: float
+    rendered: Rendered
+    fails_N_m: float
+    failure: Failure | None
+
+
+@dataclass(frozen=True)
+class Row:
+    """What was found of a stabilizer on a loop.
+
+    Attributes:
+        values: the parameters that render most in the tuning, in the order of the family.
+        at_edge: the parameters within a twentieth of the end of their search, and "wall" where no stiffest was found.
+        seeds: what came of each seed with those parameters.
+        breaks: the softest wall that failed under any of them, N/m, and what it did.
+        parameter, device: the held stiffness with all parameters, or the device, 20 % less and more, over that without.
+    """
+
+    family: str
+    block: int
+    values: Values
+    at_edge: tuple[str, ...]
+    seeds: tuple[Trying, ...]
+    breaks: tuple[float, str] | None
+    parameter: tuple[float, ...] = ()
+    device: tuple[float, ...] = ()
+
+
+def family_of(name: str) -> Family:
+    return next(family for family in STABILIZERS if family.name == name)
+
+
+def alone(loop: Scene) -> float:
+    """Returns about the stiffest wall that bears a few conditions without any element, N/m; 10 at least."""
+    query = Query(loop, (), draw(ranges(loop), 0, 0, 6), ladder(10.0, 1e5, 1.6))
+    with Trial(Store(), 1) as trial:
+        return max(10.0 * LEAST_N_M, limits(trial, [query], _ROUGH)[0].stiffness_N_m)
+
+
+def bench(job: Job) -> Row:
+    """Tunes and tries one stabilizer."""
+    loop, family, effort = job.loop, family_of(job.family), job.effort
+    of, ends = ranges(loop), box(family, loop, job.alone_N_m)
+    tuning = draw(of, job.block, 0, effort.cases)
+    with Trial(Store(), 1) as trial:
+
+        def tune(choices: Sequence[Values]) -> dict[Values, Trying]:
+            rungs = tuple(job.alone_N_m * times for times in _RUNGS)
+            queries = [Query(loop, family.elements(values), tuning, rungs) for values in choices]
+            return dict(zip(choices, tried(trial, queries, _ROUGH), strict=True))
+
+        values = _tuned(tune, ends, effort.points)
+        elements, [near] = family.elements(values), tune([values]).values()
+        rungs = tuple(times * (near.limit_N_m or job.alone_N_m / 3.0) for times in _ABOUT)
+        drawn = [draw(of, job.block, seed, effort.of_seed) for seed in range(1, effort.seeds + 1)]
+        seeds = tried(trial, [Query(loop, elements, cases, rungs) for cases in drawn], CLOSE)
+        shares: list[float] = []
+        if job.sensitive:
+            off = [family.elements(_times(values, ends, factor)) for factor in OFF] if values else []
+            queries = [Query(loop, some, tuning, rungs) for some in (elements, *off)]
+            queries += [Query(_device(loop, factor), elements, tuning, rungs) for factor in OFF]
+            base, *moved = (each.rendered.held_N_m for each in tried(trial, queries, CLOSE))
+            shares = [each / base if base else 0.0 for each in moved]
+    worst = min((each for each in seeds if each.failure), key=lambda each: each.fails_N_m, default=None)
+    return Row(
+        family=family.name,
+        block=job.block,
+        values=values,
+        at_edge=_at_edge(family, values, ends, seeds),
+        seeds=tuple(seeds),
+        breaks=(worst.fails_N_m, describe(worst.failure)) if worst and worst.failure else None,
+        parameter=tuple(shares[: -len(OFF)]),
+        device=tuple(shares[-len(OFF) :]),
+    )
+
+
+def tried(trial: Trial, queries: Sequence[Query], tolerance: float) -> list[Trying]:
+    """Finds the limit of each query, and measures what is rendered there; of a hidden wall, softer ones, too."""
+    found = limits(trial, queries, tolerance)
+    best = [(limit.stiffness_N_m, each) for limit, each in zip(
+        found, rendered(queries, [limit.stiffness_N_m for limit in found]), strict=True)]  # fmt: skip
+    hidden = [place for place, (wall_N_m, each) in enumerate(best) if each.held_N_m < _HIDDEN * wall_N_m]
+    softer = [(place, best[place][0] * 0.5**times) for place in hidden for times in range(1, _HALVINGS + 1)]
+    shown = rendered([queries[place] for place, _ in softer], [wall_N_m for _, wall_N_m in softer])
+    for (place, wall_N_m), each in zip(softer, shown, strict=True):
+        if each.held_N_m > best[place][1].held_N_m:
+            best[place] = wall_N_m, each
+    return [
+        Trying(limit.stiffness_N_m, *each, limit.fails_N_m, limit.failure)
+        for limit, each in zip(found, best, strict=True)
+    ]
+
+
+def _tuned(tune: Tune, ends: Sequence[Ends], count: int) -> Values:
+    """Returns the parameters that render most: of some over the whole box, then of as many along its axes, twice.
+
+    The first has the smallest of all, which are about none.
+    """
+    if not ends:
+        return ()
+    smallest = tuple(float(f"{low:.2g}") for low, _ in ends)
+    known = tune([smallest, *halton(ends, count)])
+    for share in _ALONG:
+        best = max(known, key=lambda values: known[values].rendered.held_N_m)
+        known |= tune([values for values in along(best, ends, share, count // len(ends)) if values not in known])
+    return max(known, key=lambda values: known[values].rendered.held_N_m)
+
+
+def along(best: Values, ends: Sequence[Ends], share: float, count: int) -> list[Values]:
+    """Returns so many points on each axis through the best, over this share of the axis's length, to two digits."""
+    points: list[Values] = []
+    for axis, (value, (low, high)) in enumerate(zip(best, ends, strict=True)):
+        wide = (high / low) ** (share / 2.0)
+        left, right = max(low, value / wide), min(high, value * wide)
+        for place in range(count):
+            moved = float(f"{left * (right / left) ** ((place + 0.5) / count):.2g}")
+            points.append((*best[:axis], moved, *best[axis + 1 :]))
+    return list(dict.fromkeys(points))
+
+
+def halton(ends: Sequence[Ends], count: int) -> list[Values]:
+    """Returns points of the Halton sequence between the ends, evenly on logarithmic axes, to two digits."""
+    points = []
+    for index in range(1, count + 1):
+        unit = [_radical_inverse(index, base) for base in _BASES[: len(ends)]]
+        points.append(tuple(float(f"{low * (high / low) ** u:.2g}") for u, (low, high) in zip(unit, ends, strict=True)))
+    return list(dict.fromkeys(points))
+
+
+def _radical_inverse(index: int, base: int) -> float:
+    found, share = 0.0, 1.0
+    while index:
+        share /= base
+        index, digit = divmod(index, base)
+        found += digit * share
+    return found
+
+
+def _times(values: Values, ends: Sequence[Ends], factor: float) -> Values:
+    """Returns all parameters multiplied, but none beyond the end of its search."""
+    return tuple(min(value * factor, max(high, value)) for value, (_, high) in zip(values, ends, strict=True))
+
+
+def _device(loop: Scene, factor: float) -> Scene:
+    for key in _DEVICE:
+        if value_at(loop, key):
+            loop = scaled(loop, key, factor)
+    return loop
+
+
+def _at_edge(family: Family, values: Values, ends: Sequence[Ends], seeds: Sequence[Trying]) -> tuple[str, ...]:
+    found = []
+    for (_, key), value, (low, high) in zip(family.parts, values, ends, strict=True):
+        near = (high / low) ** 0.05
+        found += [key] * (not low * near < value < high / near)
+    return tuple(found + ["wall"] * any(each.limit_N_m >= MOST_N_M for each in seeds))

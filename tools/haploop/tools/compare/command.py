@@ -1,0 +1,96 @@
+"""``haploop compare``: every stabilizer on a device or a scene, each tuned by the same search with the same effort."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from haploop.logger.summary import finite
+from haploop.tools.cli.options import FAILED, WRONG_USE, Json, Plugin, Set, leave, plain_errors, print_json
+
+_NO_BOUND = "Force bounding is left out: it counts on the damping that the device declares, which is 0 here."
+ROWS, COMPARISON, FIGURE = "rows.jsonl", "comparison.json", "comparison.png"
+
+if TYPE_CHECKING:
+    from haploop.tools.advise.subject import Subject
+
+
+def compare(
+    device: Annotated[str, typer.Argument(help="a device that comes with haploop, or a scene", show_default=False)],
+    hand: Annotated[
+        str | None, typer.Option(metavar="HAND", help="a hand that comes with haploop, a file with one, or none")
+    ] = None,
+    delay: Annotated[str | None, typer.Option(metavar="TIME", help='round trip, s or "2 ms"')] = None,
+    estimator: Annotated[
+        str | None, typer.Option(metavar="NAME", help="difference, window, foaw, kalman or accelerometer")
+    ] = None,
+    set: Set = None,
+    plugin: Plugin = None,
+    grid: Annotated[
+        bool, typer.Option("--grid/--no-grid", help="also with more delay, a finer encoder, a slower drive")
+    ] = True,
+    workers: Annotated[int | None, typer.Option(help="processes [as many as cores]", show_default=False)] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="directory; one of a comparison goes on [runs/compare-DEVICE-TIME]"),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Compare every stabilizer, each tuned alike: how stiff a wall it renders safely, what it costs, where it breaks.
+
+    Can be stopped; the same command with --out DIR, the directory of the first, goes on.
+    """
+    from haploop.tools.advise.subject import InvalidRequest, make_subject
+    from haploop.tools.cli.scenes import kinds_with
+
+    if workers is not None and workers < 1:
+        leave(f"--workers must be at least 1, but {workers} was given.", WRONG_USE)
+    with plain_errors():
+        try:
+            subject = make_subject(device, hand, delay, estimator, set or [], kinds_with(plugin or []))
+        except InvalidRequest as error:
+            leave(str(error), WRONG_USE)
+        _compare(subject, grid, workers, out, json)
+
+
+def _compare(subject: Subject, grid: bool, workers: int | None, out: Path | None, as_json: bool) -> None:
+    from haploop.launch.spec import make_output
+    from haploop.tools.advise.families import FORCE_BOUNDING
+    from haploop.tools.advise.walls.cases import make_loop
+    from haploop.tools.compare.bench import Effort
+    from haploop.tools.compare.comparison import DESCRIBED, Comparison, Kept, applies, compare, variants
+    from haploop.tools.compare.conditions import task_words
+    from haploop.tools.compare.figure import draw
+    from haploop.tools.compare.report import comparison_data, report
+    from haploop.tools.executor.executors import make_executor
+    from haploop.tools.figure.data import FigureError
+    from haploop.tools.render.progress import bars
+    from haploop.tools.render.terminal import console
+
+    loop = make_loop(subject.scene, subject.has_task)
+    loops = variants(loop) if grid else {DESCRIBED: loop}
+    goes_on = out is not None and (out / ROWS).exists()
+    out = out if out is not None and goes_on else make_output(out, Path(f"compare-{subject.name}"), first=ROWS)
+    effort = Effort()
+    try:
+        with bars() as stage, make_executor(workers) as executor:
+            found = compare(loops, effort, Kept(out / ROWS), executor, stage)
+    except KeyboardInterrupt:
+        leave(f"Interrupted; the same command with --out {out} goes on.", FAILED)
+    notes = [*subject.notes, *([] if applies(FORCE_BOUNDING, loop) else [_NO_BOUND])]
+    told = Comparison(subject.name, task_words(loop), tuple(notes), effort, found)
+    if not as_json:
+        console().print(report(told))
+    data = comparison_data(told)
+    (out / COMPARISON).write_text(json.dumps(finite(data), indent=1) + "\n", encoding="utf-8")
+    if as_json:
+        print_json(data)
+    print(out / COMPARISON, file=sys.stderr)
+    try:
+        print(draw(told, out / FIGURE), file=sys.stderr)
+    except FigureError as error:
+        print(f"Note: {error}", file=sys.stderr)

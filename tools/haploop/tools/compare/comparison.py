@@ -1,0 +1,192 @@
+"""The comparison of all stabilizers on a loop and on some like it: what is asked, kept on disk, and found."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from haploop.protocol.scene.paths import value_at, with_value
+from haploop.protocol.scene.scene import Actuator, Scene
+from haploop.tools.advise.families import FORCE_BOUNDING, STABILIZERS, Family
+from haploop.tools.advise.walls.trial import Failure
+from haploop.tools.compare.bench import Effort, Job, Row, Trying, alone, bench
+from haploop.tools.compare.rendered import Rendered
+from haploop.tools.executor.executors import Executor
+from haploop.tools.render.progress import Stage
+
+DESCRIBED = "as described"
+# Seeds that are told, and those that rankings are held against: tuning and trial have others.
+TOLD, AGAIN = 1, 2
+# Loops that are tried under both: as described, and with more delay.
+_REPEATED = 2
+_LATER_S, _FINER, _DRIVE_HZ = 1e-3, 0.25, 100.0
+
+
+@dataclass(frozen=True)
+class OfLoop:
+    """All stabilizers on one loop.
+
+    Attributes:
+        delay_s: the round trip.
+        alone_N_m: about the stiffest wall without any, from which the searches begin.
+        rows: under the seeds told.
+        again: under the others; empty where they were not tried.
+    """
+
+    name: str
+    delay_s: float
+    alone_N_m: float
+    rows: tuple[Row, ...]
+    again: tuple[Row, ...] = ()
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What ``haploop compare`` found.
+
+    Attributes:
+        loops: the loop as described first.
+        task: what every wall has to bear, in words.
+    """
+
+    name: str
+    task: str
+    notes: tuple[str, ...]
+    effort: Effort
+    loops: tuple[OfLoop, ...]
+
+
+def variants(loop: Scene) -> dict[str, Scene]:
+    """Returns the loop and those with another delay, sensor and drive, by name; only what changes something."""
+    clock, actuator = loop.clock, loop.actuator or Actuator()
+    found = {DESCRIBED: loop}
+    later = clock.round_trip_delay + _LATER_S
+    found[f"{_LATER_S * 1e3:g} ms of delay more"] = with_value(loop, "clock.round_trip_delay", later)
+    if step := value_at(loop, "encoder.resolution"):
+        found["encoder four times as fine"] = with_value(loop, "encoder.resolution", step * _FINER)
+    if actuator.bandwidth is None or actuator.bandwidth > _DRIVE_HZ:
+        slow = replace(loop, actuator=replace(actuator, bandwidth=_DRIVE_HZ))
+        found[f"drive of {_DRIVE_HZ:g} Hz"] = slow
+    return found
+
+
+def applies(family: Family, loop: Scene) -> bool:
+    """Tells whether a family can act: force bounding lets no force pass where the device declares no damping."""
+    return family is not FORCE_BOUNDING or bool(loop.device.damping)
+
+
+class Kept:
+    """Rows found earlier, by a key that has everything in it that decides; a line each in a file."""
+
+    def __init__(self, file: Path) -> None:
+        self._file, self._known = file, dict[str, Any]()
+        text = file.read_text(encoding="utf-8", errors="replace") if file.exists() else ""
+        for line in text.splitlines():
+            with contextlib.suppress(ValueError):
+                key, found = json.loads(line)
+                self._known[key] = found
+
+    def get(self, key: str) -> Any:
+        """Returns what is kept by this key, or None."""
+        return self._known.get(key)
+
+    def add(self, key: str, found: Any) -> None:
+        """Keeps what was found, on disk at once."""
+        self._known[key] = json.loads(json.dumps(found))
+        with self._file.open("a", encoding="utf-8") as file:
+            file.write("\n" + json.dumps([key, found]) + "\n")
+
+
+def key_of(*told: object) -> str:
+    return hashlib.sha256(repr((version("haploop"), *told)).encode()).hexdigest()[:24]
+
+
+def compare(
+    loops: dict[str, Scene], effort: Effort, kept: Kept, executor: Executor, stage: Stage
+) -> tuple[OfLoop, ...]:
+    """Tunes and tries every stabilizer on every loop but what is kept; on two of them under two sets of seeds."""
+    repeated = list(loops)[:_REPEATED]
+    ends = _each(alone, {key_of("alone", loop): loop for loop in loops.values()}, kept, executor,
+                 stage, "walls without any element", float)  # fmt: skip
+    alone_N_m = {name: ends[key_of("alone", loop)] for name, loop in loops.items()}
+    jobs = {
+        (name, block, family.name): Job(
+            loop, family.name, alone_N_m[name], block, effort, block == TOLD and name in repeated
+        )
+        for block in (TOLD, AGAIN)
+        for name, loop in loops.items()
+        if block == TOLD or name in repeated
+        for family in STABILIZERS
+        if applies(family, loop)
+    }
+    found = _each(bench, {key_of(job): job for job in jobs.values()}, kept, executor, stage, "stabilizers", _as_row)
+
+    def rows(name: str, block: int) -> tuple[Row, ...]:
+        return tuple(found[key_of(job)] for (loop, of, _), job in jobs.items() if (loop, of) == (name, block))
+
+    return tuple(
+        OfLoop(name, loop.clock.round_trip_delay, alone_N_m[name], rows(name, TOLD), rows(name, AGAIN))
+        for name, loop in loops.items()
+    )
+
+
+def _each(
+    call: Callable[[Any], Any], items: dict[str, Any], kept: Kept, executor: Executor, stage: Stage, words: str,
+    read: Callable[[Any], Any],
+) -> dict[str, Any]:  # fmt: skip
+    """Calls on each item that nothing is kept of; answers are kept as they come."""
+    new = {key: item for key, item in items.items() if kept.get(key) is None}
+    advance = stage(words, len(new))
+    under_way: dict[Future[Any], str] = {}
+    while new or under_way:
+        while new and len(under_way) < executor.count:
+            key = next(iter(new))
+            under_way[executor.submit(call, new.pop(key))] = key
+        for future in wait(under_way, return_when=FIRST_COMPLETED).done:
+            answer = future.result()
+            kept.add(under_way.pop(future), answer if isinstance(answer, float) else asdict(answer))
+            advance()
+    return {key: read(kept.get(key)) for key in items}
+
+
+def _as_row(data: dict[str, Any]) -> Row:
+    """Returns the row that ``asdict`` and JSON made lists of."""
+    breaks = data["breaks"]
+    return Row(
+        family=data["family"],
+        block=data["block"],
+        values=tuple(data["values"]),
+        at_edge=tuple(data["at_edge"]),
+        seeds=tuple(_as_trying(each) for each in data["seeds"]),
+        breaks=(breaks[0], breaks[1]) if breaks else None,
+        parameter=tuple(data["parameter"]),
+        device=tuple(data["device"]),
+    )
+
+
+def as_comparison(data: dict[str, Any]) -> Comparison:
+    """Returns the comparison that was written as JSON."""
+    loops = [
+        OfLoop(
+            each["name"],
+            each["delay_s"],
+            each["alone_N_m"],
+            *(tuple(map(_as_row, each[of])) for of in ("rows", "again")),
+        )
+        for each in data["loops"]
+    ]
+    return Comparison(data["name"], data["task"], tuple(data["notes"]), Effort(**data["effort"]), tuple(loops))
+
+
+def _as_trying(data: Sequence[Any]) -> Trying:
+    limit_N_m, wall_N_m, shown, fails_N_m, failure = data
+    fails = math.inf if fails_N_m is None else fails_N_m
+    return Trying(limit_N_m, wall_N_m, Rendered(*shown), fails, Failure(**failure) if failure else None)

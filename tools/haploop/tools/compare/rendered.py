@@ -1,0 +1,77 @@
+"""What a hand gets of a wall that is safe: stiffness as rendered, ripple, and the force that an element adds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from haploop.protocol.scene.scene import Wall
+from haploop.tools.advise.walls.cases import LASTS_S, slowness
+from haploop.tools.advise.walls.felt import buzz, felt_m
+from haploop.tools.advise.walls.limit import Query
+from haploop.tools.advise.walls.loops import Seen, make_loops
+from haploop.tools.advise.walls.trial import FROM_S, STRETCH_S
+from haploop.tools.linear.linearity import installed_kinds
+
+
+class Rendered(NamedTuple):
+    """What a wall renders, over all cases of a query; 0 throughout where no wall is safe.
+
+    Attributes:
+        held_N_m: mean force over mean penetration, from 0.75 s on.
+        contact_N_m: slope of force over penetration, by least squares, on the first way in.
+        ripple_N: largest peak to peak of the command above 30 Hz in a quarter of a second, mean of the cases.
+        extra_N, extra_rms_N: largest and root mean square force of the elements.
+    """
+
+    held_N_m: float = 0.0
+    contact_N_m: float = 0.0
+    ripple_N: float = 0.0
+    extra_N: float = 0.0
+    extra_rms_N: float = 0.0
+
+
+def rendered(queries: Sequence[Query], stiffnesses_N_m: Sequence[float]) -> list[Rendered]:
+    """Measures each query's wall of that stiffness in its cases, all side by side."""
+    members = [(index, case) for index, query in enumerate(queries) if stiffnesses_N_m[index] for case in query.cases]
+    scenes = [
+        replace(
+            case.scene(queries[index].loop),
+            wall=Wall(position=0.0, stiffness=stiffnesses_N_m[index]),
+            dissipation=queries[index].elements,
+        )
+        for index, case in members
+    ]
+    rows: list[list[Rendered]] = [[] for _ in queries]
+    for group, loops in make_loops(scenes, installed_kinds()):
+        scene = scenes[group[0]]
+        seen = loops.go_on(round(slowness(queries[members[group[0]][0]].loop) * LASTS_S * scene.clock.control_rate))
+        stiffness = np.array([stiffnesses_N_m[members[place][0]] for place in group])
+        for place, row in zip(group, _measure(seen, stiffness, scene.clock.control_rate), strict=True):
+            rows[members[place][0]].append(row)
+    return [Rendered(*np.mean(row, axis=0).tolist()) if row else Rendered() for row in rows]
+
+
+def _measure(seen: Seen, stiffness_N_m: np.ndarray, rate: float) -> list[Rendered]:
+    depth, force = np.maximum(-seen.x, 0.0), np.where(seen.x < 0.0, seen.command, 0.0)
+    late = slice(round(FROM_S * rate), None)
+    held = _share(force[late].sum(axis=0), depth[late].sum(axis=0))
+    # The first way in: from contact until the device first moves out, or does not move.
+    inside = np.maximum.accumulate(depth > 0.0, axis=0)
+    out = np.diff(depth, axis=0, prepend=0.0) <= 0.0
+    way_in = inside & ~np.logical_or.accumulate(inside & out, axis=0)
+    contact = _share((way_in * force * depth).sum(axis=0), (way_in * depth * depth).sum(axis=0))
+    stretch, ripple = round(STRETCH_S * rate), np.zeros(seen.x.shape[1])
+    for at in range(late.start, len(seen.x) - stretch + 1, stretch):
+        part = slice(at, at + stretch)
+        ripple = np.maximum(ripple, buzz(seen.x[part], seen.measured[part], seen.command[part], rate, felt_m).force_N)
+    extra = seen.command - stiffness_N_m * np.maximum(-seen.measured, 0.0)
+    peak, rms = np.abs(extra).max(axis=0), np.sqrt((extra**2).mean(axis=0))
+    return [Rendered(*row) for row in np.stack([held, contact, ripple, peak, rms], axis=1).tolist()]
+
+
+def _share(force: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    return np.divide(force, depth, out=np.zeros_like(force), where=depth > 0.0)
