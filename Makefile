@@ -13,7 +13,7 @@ QUICK := tests/scene tests/log tests/estimators tests/clock $(patsubst %,tests/p
   energy/test_leak energy/test_energy_per_sample sensing/test_random_stream)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo quick test slow simulate faults check bench accuracy paper notebook lock clean
+.PHONY: help demo quick test slow simulate faults check bench accuracy paper comparison notebook lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
@@ -61,6 +61,12 @@ paper: $(READY) ## make every figure of the paper, write docs/paper.md and paper
 	@$(BIN)/python -m haploop.tools.studies.choi2022.command runs/paper docs
 	@cp runs/paper/fig6?_nearest.toml launch/scenes/paper/
 	@cp runs/paper/premium_press.toml launch/scenes/
+
+comparison: $(READY) ## compare every stabilizer on three devices and write docs/comparison.md (some 20 minutes on two quiet cores; stopped, it goes on)
+	@$(BIN)/haploop compare premium15_cable --out runs/comparison/premium15_cable
+	@$(BIN)/haploop compare touch --delay "1 ms" --out runs/comparison/touch
+	@$(BIN)/haploop compare omega3 --delay "1 ms" --out runs/comparison/omega3
+	@$(BIN)/python -m haploop.tools.compare.page runs/comparison docs
 
 notebook: $(READY) ## run docs/notebook.ipynb anew and keep its figures
 	@$(BIN)/python -m haploop.tools.notebook docs/notebook.ipynb

@@ -32,7 +32,8 @@ _DEVICE = ("device.mass", "device.damping", "friction.kinetic", "transmission.st
 OFF = (0.8, 1.2)
 
 Ends = tuple[float, float]
-Tune = Callable[[Sequence[Values]], dict[Values, "Trying"]]
+Choice = tuple[int, Values]
+Tune = Callable[[Sequence[Choice]], dict[Choice, "Trying"]]
 
 
 @dataclass(frozen=True)
@@ -45,10 +46,10 @@ class Effort:
         seeds: each draws ``of_seed`` cases.
     """
 
-    points: int = 5
-    cases: int = 4
-    seeds: int = 6
-    of_seed: int = 3
+    points: int = 6
+    cases: int = 5
+    seeds: int = 8
+    of_seed: int = 4
 
 
 @dataclass(frozen=True)
@@ -57,14 +58,14 @@ class Job:
 
     Attributes:
         alone_N_m: about the stiffest wall without any.
-        block: the seeds that it is tuned and tried by; blocks share none.
+        blocks: the seeds that it is tuned and tried by, each for itself; blocks share none.
         sensitive: whether its sensitivity is measured.
     """
 
     loop: Scene
     family: str
     alone_N_m: float
-    block: int
+    blocks: tuple[int, ...]
     effort: Effort
     sensitive: bool = True
 
@@ -117,34 +118,45 @@ def alone(loop: Scene) -> float:
         return max(10.0 * LEAST_N_M, limits(trial, [query], _ROUGH)[0].stiffness_N_m)
 
 
-def bench(job: Job) -> Row:
-    """Tunes and tries one stabilizer."""
-    loop, family, effort = job.loop, family_of(job.family), job.effort
+def bench(job: Job) -> tuple[Row, ...]:
+    """Tunes and tries one stabilizer by every block of seeds, side by side."""
+    loop, family, effort, blocks = job.loop, family_of(job.family), job.effort, job.blocks
     of, ends = ranges(loop), box(family, loop, job.alone_N_m)
-    tuning = draw(of, job.block, 0, effort.cases)
+    tuning = {block: draw(of, block, 0, effort.cases) for block in blocks}
     with Trial(Store(), 1) as trial:
 
-        def tune(choices: Sequence[Values]) -> dict[Values, Trying]:
+        def tune(choices: Sequence[Choice]) -> dict[Choice, Trying]:
             rungs = tuple(job.alone_N_m * times for times in _RUNGS)
-            queries = [Query(loop, family.elements(values), tuning, rungs) for values in choices]
+            queries = [Query(loop, family.elements(values), tuning[block], rungs) for block, values in choices]
             return dict(zip(choices, tried(trial, queries, _ROUGH), strict=True))
 
-        values = _tuned(tune, ends, effort.points)
-        elements, [near] = family.elements(values), tune([values]).values()
-        rungs = tuple(times * (near.limit_N_m or job.alone_N_m / 3.0) for times in _ABOUT)
-        drawn = [draw(of, job.block, seed, effort.of_seed) for seed in range(1, effort.seeds + 1)]
-        seeds = tried(trial, [Query(loop, elements, cases, rungs) for cases in drawn], CLOSE)
-        shares: list[float] = []
-        if job.sensitive:
-            off = [family.elements(_times(values, ends, factor)) for factor in OFF] if values else []
-            queries = [Query(loop, some, tuning, rungs) for some in (elements, *off)]
-            queries += [Query(_device(loop, factor), elements, tuning, rungs) for factor in OFF]
-            base, *moved = (each.rendered.held_N_m for each in tried(trial, queries, CLOSE))
-            shares = [each / base if base else 0.0 for each in moved]
+        best = _tuned(tune, ends, effort.points, blocks)
+        queries: list[Query] = []
+        for block, (values, near) in best.items():
+            elements = family.elements(values)
+            rungs = tuple(times * (near.limit_N_m or job.alone_N_m / 3.0) for times in _ABOUT)
+            drawn = [draw(of, block, seed, effort.of_seed) for seed in range(1, effort.seeds + 1)]
+            queries += [Query(loop, elements, cases, rungs) for cases in drawn]
+            if job.sensitive:
+                off = [family.elements(_times(values, ends, factor)) for factor in OFF] if values else []
+                queries += [Query(loop, some, tuning[block], rungs) for some in (elements, *off)]
+                queries += [Query(_device(loop, factor), elements, tuning[block], rungs) for factor in OFF]
+        found = tried(trial, queries, CLOSE)
+    each = len(found) // len(blocks)
+    parts = [found[place : place + each] for place in range(0, len(found), each)]
+    return tuple(
+        _row(family, block, best[block][0], ends, part, effort.seeds) for block, part in zip(blocks, parts, strict=True)
+    )
+
+
+def _row(family: Family, block: int, values: Values, ends: Sequence[Ends], found: Sequence[Trying], count: int) -> Row:
+    """Makes the row of a block: so many seeds, then the tuning again as it is and with what is 20 % off."""
+    seeds, base, *moved = (found[:count], *(each.rendered.held_N_m for each in found[count:]), 0.0)
+    shares = [each / base if base else 0.0 for each in moved[:-1]]
     worst = min((each for each in seeds if each.failure), key=lambda each: each.fails_N_m, default=None)
     return Row(
         family=family.name,
-        block=job.block,
+        block=block,
         values=values,
         at_edge=_at_edge(family, values, ends, seeds),
         seeds=tuple(seeds),
@@ -171,24 +183,27 @@ def tried(trial: Trial, queries: Sequence[Query], tolerance: float) -> list[Tryi
     ]
 
 
-def _tuned(tune: Tune, ends: Sequence[Ends], count: int) -> Values:
-    """Returns the parameters that render most: of some over the whole box, then of as many along its axes, twice.
+def _tuned(tune: Tune, ends: Sequence[Ends], count: int, blocks: Sequence[int]) -> dict[int, tuple[Values, Trying]]:
+    """Returns what renders most in each block: of some over the whole box, then of as many along its axes, twice.
 
-    The first has the smallest of all, which are about none.
+    The first has the smallest of all parameters, which are about none.
     """
-    if not ends:
-        return ()
-    smallest = tuple(float(f"{low:.2g}") for low, _ in ends)
-    known = tune([smallest, *halton(ends, count)])
-    for share in _ALONG:
-        best = max(known, key=lambda values: known[values].rendered.held_N_m)
-        known |= tune([values for values in along(best, ends, share, count // len(ends)) if values not in known])
-    return max(known, key=lambda values: known[values].rendered.held_N_m)
+    first = [tuple(float(f"{low:.2g}") for low, _ in ends), *(halton(ends, count) if ends else [])]
+    known = tune([(block, values) for block in blocks for values in first])
+
+    def best(block: int) -> tuple[Values, Trying]:
+        of_block = {values: each for (of, values), each in known.items() if of == block}
+        return max(of_block.items(), key=lambda each: each[1].rendered.held_N_m)
+
+    for share in _ALONG if ends else ():
+        more = [(block, values) for block in blocks for values in along(best(block)[0], ends, share, count)]
+        known |= tune([choice for choice in more if choice not in known])
+    return {block: best(block) for block in blocks}
 
 
 def along(best: Values, ends: Sequence[Ends], share: float, count: int) -> list[Values]:
-    """Returns so many points on each axis through the best, over this share of the axis's length, to two digits."""
-    points: list[Values] = []
+    """Returns so many points on the axes through the best, over this share of an axis's length, to two digits."""
+    points, count = list[Values](), count // len(ends)
     for axis, (value, (low, high)) in enumerate(zip(best, ends, strict=True)):
         wide = (high / low) ** (share / 2.0)
         left, right = max(low, value / wide), min(high, value * wide)

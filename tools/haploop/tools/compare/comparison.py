@@ -118,19 +118,19 @@ def compare(
                  stage, "walls without any element", float)  # fmt: skip
     alone_N_m = {name: ends[key_of("alone", loop)] for name, loop in loops.items()}
     jobs = {
-        (name, block, family.name): Job(
-            loop, family.name, alone_N_m[name], block, effort, block == TOLD and name in repeated
+        (name, family.name): Job(
+            loop, family.name, alone_N_m[name], (TOLD, AGAIN) if name in repeated else (TOLD,), effort, name in repeated
         )
-        for block in (TOLD, AGAIN)
         for name, loop in loops.items()
-        if block == TOLD or name in repeated
         for family in STABILIZERS
         if applies(family, loop)
     }
-    found = _each(bench, {key_of(job): job for job in jobs.values()}, kept, executor, stage, "stabilizers", _as_row)
+    found = _each(bench, {key_of(job): job for job in jobs.values()}, kept, executor, stage, "stabilizers", _as_rows)
 
     def rows(name: str, block: int) -> tuple[Row, ...]:
-        return tuple(found[key_of(job)] for (loop, of, _), job in jobs.items() if (loop, of) == (name, block))
+        return tuple(
+            row for (of, _), job in jobs.items() if of == name for row in found[key_of(job)] if row.block == block
+        )
 
     return tuple(
         OfLoop(name, loop.clock.round_trip_delay, alone_N_m[name], rows(name, TOLD), rows(name, AGAIN))
@@ -152,9 +152,13 @@ def _each(
             under_way[executor.submit(call, new.pop(key))] = key
         for future in wait(under_way, return_when=FIRST_COMPLETED).done:
             answer = future.result()
-            kept.add(under_way.pop(future), answer if isinstance(answer, float) else asdict(answer))
+            kept.add(under_way.pop(future), answer if isinstance(answer, float) else [asdict(row) for row in answer])
             advance()
     return {key: read(kept.get(key)) for key in items}
+
+
+def _as_rows(data: Sequence[dict[str, Any]]) -> tuple[Row, ...]:
+    return tuple(map(_as_row, data))
 
 
 def _as_row(data: dict[str, Any]) -> Row:
@@ -179,7 +183,7 @@ def as_comparison(data: dict[str, Any]) -> Comparison:
             each["name"],
             each["delay_s"],
             each["alone_N_m"],
-            *(tuple(map(_as_row, each[of])) for of in ("rows", "again")),
+            *(_as_rows(each[of]) for of in ("rows", "again")),
         )
         for each in data["loops"]
     ]

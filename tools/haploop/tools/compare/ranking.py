@@ -39,10 +39,9 @@ class Ranking(NamedTuple):
 def apart(rows: Iterable[Row]) -> frozenset[tuple[str, str]]:
     """Returns the pairs whose intervals have no point in common, the larger first."""
     pairs = set[tuple[str, str]]()
-    for some, other in combinations(rows, 2):
-        if held(some).apart(held(other)):
-            more, less = (some, other) if held(some).value > held(other).value else (other, some)
-            pairs.add((more.family, less.family))
+    for (some, held_N_m), (other, than_N_m) in combinations([(row.family, held(row)) for row in rows], 2):
+        if held_N_m.apart(than_N_m):
+            pairs.add((some, other) if held_N_m.value > than_N_m.value else (other, some))
     return frozenset(pairs)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from haploop.protocol.scene.scene import Wall
+from haploop.protocol.scene.scene import Clock, Wall
 from haploop.tools.advise.walls.cases import LASTS_S, slowness
 from haploop.tools.advise.walls.felt import buzz, felt_m
 from haploop.tools.advise.walls.limit import Query
@@ -21,8 +21,8 @@ class Rendered(NamedTuple):
     """What a wall renders, over all cases of a query; 0 throughout where no wall is safe.
 
     Attributes:
-        held_N_m: mean force over mean penetration, from 0.75 s on.
-        contact_N_m: slope of force over penetration, by least squares, on the first way in.
+        held_N_m: mean force over mean penetration, from 0.75 s on; the force is the one that acts, a delay later.
+        contact_N_m: slope of the same force over penetration, by least squares, on the first way in.
         ripple_N: largest peak to peak of the command above 30 Hz in a quarter of a second, mean of the cases.
         extra_N, extra_rms_N: largest and root mean square force of the elements.
     """
@@ -50,13 +50,17 @@ def rendered(queries: Sequence[Query], stiffnesses_N_m: Sequence[float]) -> list
         scene = scenes[group[0]]
         seen = loops.go_on(round(slowness(queries[members[group[0]][0]].loop) * LASTS_S * scene.clock.control_rate))
         stiffness = np.array([stiffnesses_N_m[members[place][0]] for place in group])
-        for place, row in zip(group, _measure(seen, stiffness, scene.clock.control_rate), strict=True):
+        for place, row in zip(group, _measure(seen, stiffness, scene.clock), strict=True):
             rows[members[place][0]].append(row)
     return [Rendered(*np.mean(row, axis=0).tolist()) if row else Rendered() for row in rows]
 
 
-def _measure(seen: Seen, stiffness_N_m: np.ndarray, rate: float) -> list[Rendered]:
-    depth, force = np.maximum(-seen.x, 0.0), np.where(seen.x < 0.0, seen.command, 0.0)
+def _measure(seen: Seen, stiffness_N_m: np.ndarray, clock: Clock) -> list[Rendered]:
+    rate = float(clock.control_rate)
+    # What is commanded acts a round trip later, to the nearest tick.
+    acts = np.roll(seen.command, late_ticks := round(clock.round_trip_delay * rate), axis=0)
+    acts[:late_ticks] = 0.0
+    depth, force = np.maximum(-seen.x, 0.0), np.where(seen.x < 0.0, acts, 0.0)
     late = slice(round(FROM_S * rate), None)
     held = _share(force[late].sum(axis=0), depth[late].sum(axis=0))
     # The first way in: from contact until the device first moves out, or does not move.
