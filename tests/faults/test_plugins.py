@@ -82,7 +82,10 @@ def test_a_force_that_is_no_finite_number_fails_a_run_in_one_process_too(launche
 
 @pytest.mark.parametrize(
     ("statement", "reason"),
-    [("1 / 0", "ZeroDivisionError: division by zero"), ("return 'much'", "ValueError: could not convert")],
+    [
+        ("1 / 0", "ZeroDivisionError: division by zero"),
+        ("return 'much'", "TypeError: it returned 'much', which is text"),
+    ],
 )
 @pytest.mark.parametrize("options", first_and_slowly([], ["--in-process"]))
 def test_a_force_that_raises_or_is_no_number_fails_the_run_and_names_element_and_tick(
@@ -94,6 +97,7 @@ def test_a_force_that_raises_or_is_no_number_fails_the_run_and_names_element_and
     run = launched("run", str(made["scene"]), "--plugin", str(made["plugin"]), *options, out=out)
     run.end(1)
     assert f"Element 0 (brake) gave no force at tick 150: {reason}" in run.stderr
+    assert "Traceback" not in run.stderr, "lines of the element are shown, none of haploop's"
     assert len(haploop.logger.read(out)["/controller"]["x"]) == 150
     assert replay(out).differences == []
 
@@ -129,6 +133,7 @@ def test_a_force_that_never_returns_is_named_with_element_tick_and_line_after_th
     run.leaves_nothing()
     assert "Element 0 (brake) gave no force at tick 150: DeadlineOver: it was in line " in run.stderr
     assert "/plugins/brake-" in run.stderr
+    assert "Traceback" not in run.stderr
     assert len(run.log()["/controller"]["x"]) == 150
     assert replay(run.out).differences == []
 
@@ -168,6 +173,7 @@ def test_an_element_that_leaves_is_named_with_its_tick(statement, reason, runnin
     run.end(1)
     run.leaves_nothing()
     assert f"Element 0 (brake) gave no force at tick 150: {reason}" in run.stderr
+    assert "Traceback" not in run.stderr, "lines of the element are shown, none of haploop's"
     assert replay(run.out).differences == []
 
 

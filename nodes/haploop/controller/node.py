@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import traceback
+import sys
+from linecache import getline
 from pathlib import Path
 
 import zmq
@@ -10,6 +11,7 @@ import zmq
 from haploop.controller.controller import Controller
 from haploop.controller.deadline import heed_deadline
 from haploop.controller.dissipation import ElementError, PluginError, registry
+from haploop.controller.tick import places_of
 from haploop.protocol.changes import Event, is_change, refusals_as_status
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import BlockLength, Timebase
@@ -125,7 +127,8 @@ def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory
     except PluginError as error:
         raise NodeError(str(error)) from error
     except ElementError as error:
-        traceback.print_exc()  # where in the element's own code
+        for file, line in places_of(error.__cause__):
+            print(f'  File "{file}", line {line}: {getline(file, line).strip()}', file=sys.stderr)
         raise NodeError(str(error)) from error
 
 

@@ -54,6 +54,9 @@ class ControllerState(NamedTuple):
 StateTuple = tuple[Any, Any, Any, tuple[Any, ...]]
 
 
+_HERE = Path(__file__).parent
+
+
 class NoForce(Exception):
     """An element, by its index among the active ones, that gave no force; raised from what it raised."""
 
@@ -72,11 +75,19 @@ class NoForce(Exception):
 
 def _line(error: BaseException | None) -> str:
     """Returns the file and the line of an element's code at which it raised; nothing where that is not its code."""
-    trace = error.__traceback__ if error else None
-    while trace and trace.tb_next:
+    *_, (file, line) = [("", 0), *places_of(error)]
+    return f" ({Path(file).name}, line {line})" if file else ""
+
+
+def places_of(error: BaseException | None) -> list[tuple[str, int]]:
+    """Returns the files and lines of elements through which an error came, the innermost last; none of this package."""
+    places, trace = [], error.__traceback__ if error else None
+    while trace:
+        file = trace.tb_frame.f_code.co_filename
+        if Path(file).parent != _HERE:
+            places.append((file, trace.tb_lineno))
         trace = trace.tb_next
-    file = trace.tb_frame.f_code.co_filename if trace else __file__
-    return "" if trace is None or file == __file__ else f" ({Path(file).name}, line {trace.tb_lineno})"
+    return places
 
 
 def _number(force: Any) -> float:
