@@ -117,7 +117,12 @@ def state(session: RunSession) -> Message:
         "options": None if session.outcome else session.clock.options,
         "elements": [{"kind": one.name, "parameters": {**one.parameters, "acts": one.acts}} for one in elements],
         "wall": wall
-        and {"position": wall.position, "stiffness": wall.stiffness, "into_wall": history.at_work.into_wall},
+        and {
+            "position": wall.position,
+            "stiffness": wall.stiffness,
+            "into_wall": history.at_work.into_wall,
+            **({"kind": wall.kind} if wall.kind else {}),
+        },
         "delay_s": session.delay_s,
         "summary": summary,
         "sight": sight and dataclasses.asdict(sight),

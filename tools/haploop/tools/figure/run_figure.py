@@ -12,7 +12,7 @@ from haploop.tools.figure.data import TOGETHER, Book, RunData
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
 from haploop.tools.figure.own_columns import draw_own_columns, own_columns
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
-from haploop.tools.render.report import HELD, LAW_TAKES, LEAK_CAUSES, count_losses, plant_books, swing_words
+from haploop.tools.render.report import HELD, LAW_TAKES, count_losses, leak_causes, plant_books, swing_words
 from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount, parameters, spring
 
@@ -100,8 +100,9 @@ def key_numbers(run: RunData) -> list[str]:
         words.append(f"pushed, it swings {swing_words(found)}")
     if run.history.walls and run.summary["verdict"] != "no-contact":
         words.append(f"outside the wall {100 * window['outside_fraction']:.0f} %")
-        displayed, wanted = window["displayed_stiffness_N_m"], run.history.walls[-1].wall.stiffness
-        words += [f"displayed stiffness {spring(displayed)} of {spring(wanted)}"] if displayed is not None else []
+        displayed, wall = window["displayed_stiffness_N_m"], run.history.walls[-1].wall
+        wanted = f" of {spring(wall.stiffness)}" if wall.kind in (None, "spring") else ""
+        words += [f"displayed stiffness {spring(displayed)}{wanted}"] if displayed is not None else []
     left = f"residual {amount(energy['residual_J'], 'J')} of " if "unmodelled_work_J" not in energy else ""
     words.append(f"{left}{amount(energy['moved_J'], 'J')} moved")
     words += [energy["balance"].partition(" of the energy")[0]] if "balance" in energy else []
@@ -160,7 +161,7 @@ def book_rows(run: RunData, books: list[Book]) -> list[Row]:
 def _leak_rows(wall: Summary) -> list[Row]:
     if "leak" not in wall:
         return []
-    rows = [Row(f"    leak by {words}", amount(wall["leak"][key], "J")) for key, words in LEAK_CAUSES.items()]
+    rows = [Row(f"    leak by {words}", amount(wall["leak"][key], "J")) for key, words in leak_causes(wall).items()]
     ideal = wall["ideal_J"] or 0.0
     held = abs(ideal) > 1e-9 * abs(wall["true_J"] or 0.0)
     if "dissipated_J" in wall:

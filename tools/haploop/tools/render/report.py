@@ -32,6 +32,8 @@ _COUNTS = (
 )
 # The causes of a wall's leak by their keys in the summary.
 HELD, LAW_TAKES = "held by the wall if ideal", "taken by its law"
+# The damping of a wall goes by the estimated velocity.
+_OF_DAMPING = {"quantisation_J": "quantisation and estimates"}
 LEAK_CAUSES = {"sampling_and_hold_J": "sampling and hold", "quantisation_J": "quantisation", "delay_J": "delay"}
 
 
@@ -113,13 +115,18 @@ def _lateness(of: Summary) -> list[tuple[str, str]]:
     return [("ticks late by", f"{words}; {many}{lost}")]
 
 
+def leak_causes(wall: Summary) -> dict[str, str]:
+    """Returns the entries of a wall's ``leak`` in a summary, in words."""
+    return LEAK_CAUSES | (_OF_DAMPING if "dissipated_J" in wall else {})
+
+
 def _books(energy: Summary, control_rate: float) -> Table:
     numbers = ("at work", "true", "sampled")
     table = make_table("energy taken out of the device by", *numbers, numbers=numbers)
     wall = energy["wall"]
     if "leak" in wall:
         table.add_row("wall", "", amount(wall["true_J"], "J"), amount(wall["sampled_J"], "J"))
-        for key, words in LEAK_CAUSES.items():
+        for key, words in leak_causes(wall).items():
             table.add_row(f"  leak by {words}", "", amount(wall["leak"][key], "J"), "")
         # The rounding error of a much larger number is zero.
         ideal_J, true_J = wall["ideal_J"], wall["true_J"]

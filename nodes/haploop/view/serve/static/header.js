@@ -66,7 +66,7 @@ const short = (value) => (Math.abs(value) < 1e5 ? fixed(value) : power(value, 3)
 
 function stiffness({ displayed_stiffness_N_m: displayed, wall }) {
   if (!isNumber(displayed)) return NONE;
-  return wall?.into_wall ? `${short(displayed)} of ${short(wall.stiffness)} N/m` : `${short(displayed)} N/m`;
+  return wall?.into_wall && !wall.kind ? `${short(displayed)} of ${short(wall.stiffness)} N/m` : `${short(displayed)} N/m`;
 }
 
 function share({ residual_J: residual, moved_J: moved }) {

@@ -71,7 +71,8 @@ function books({ wall = {}, elements = [], moved_J: moved, residual_J: residual,
   const head = ["book", "sampled", "true"].map((text) => make("th", { scope: "col" }, text));
   const rows = [["wall", wall.sampled_J, wall.true_J]];
   for (const [key, words] of Object.entries(CAUSES)) {
-    if (wall.leak) rows.push([`leak by ${words}`, undefined, wall.leak[key]]);
+    const estimates = key === "quantisation_J" && isNumber(wall.dissipated_J) ? " and estimates" : "";
+    if (wall.leak) rows.push([`leak by ${words}${estimates}`, undefined, wall.leak[key]]);
   }
   if (isNumber(wall.dissipated_J)) rows.push(["taken by the law of the wall", undefined, wall.dissipated_J]);
   for (const { kind, from_tick: from, to_tick: to, sampled_J, true_J } of elements) {
