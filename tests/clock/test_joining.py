@@ -9,7 +9,9 @@ import msgpack
 import pytest
 import zmq
 
+from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.clock.server import ClockServer
+from haploop.launch.processes.standstill import late_observers
 from haploop.protocol.transport.messages import PROCESSES
 from helpers.live.attacks import Stranger, pack
 from helpers.runs.clocks import clock
@@ -121,3 +123,26 @@ def test_a_message_of_very_many_frames_is_taken_over_several_turns_with_grants_b
         assert turns == 5
         assert stranger.socket.poll(10_000)
         assert msgpack.unpackb(stranger.socket.recv())[1:3] == [REPLY, True]
+
+
+def test_an_observer_that_holds_the_run_and_is_silent_or_never_ready_is_taken_off() -> None:
+    roster = Roster()
+    for number, (role, lossless, ready, heard) in enumerate(
+        [
+            ("logger", True, True, 0.0),
+            ("mute", True, True, 10.0),
+            ("slow", True, False, 29.0),
+            ("view", False, False, 0.0),
+        ]
+    ):
+        node = Node(bytes([number]), role, 1, lossless, {}, 0.0)
+        node.ready, node.heard, roster.nodes[node.identity] = ready, heard, node
+    assert [node.role for node, _ in late_observers(roster, 14.0, 5.0)] == []
+    assert [node.role for node, _ in late_observers(roster, 16.0, 5.0)] == ["mute"]
+    late = late_observers(roster, 30.0, 5.0)
+    assert [(node.role, why.partition(";")[0]) for node, why in late] == [
+        ("mute", "Nothing was heard of you for 5 s"),
+        ("slow", "You were not ready within 20 s"),
+    ]
+    roster.discount_silence(20.0)
+    assert late_observers(roster, 30.0, 5.0) == []

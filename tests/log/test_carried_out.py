@@ -9,12 +9,17 @@ import pytest
 from haploop.launch.scene.file import load
 from haploop.logger.carried_out import CarriedOut
 from haploop.protocol.changes import Change, Event, refusal, refusals_of
+from haploop.protocol.ticks import DELAY, Timebase
+from haploop.protocol.transport.node import NodeError
 from helpers.live.launched import SCENE
+from helpers.runs.captured import run
+from helpers.scenes.least import scene
 
 STIFFER: Event = {"set": {"wall.stiffness": 300.0}}
 HEAVIER: Event = {"set": {"dissipation.0.mass": 0.02}}
 DAMPED: Event = {"swap": {"kind": "damping", "damping": 1.0, "acts": "always"}, "element": 0}
 GONE: Event = {"swap": {"kind": "none"}, "element": 0}
+TIME = Timebase.from_scene(load(SCENE))
 INERTIA = {"kind": "unidirectional-inertia", "parameters": {"mass": 0.01, "acts": "in-contact"}}
 
 
@@ -25,7 +30,7 @@ def block(first: int, end: int, stiffness: float = 150.0, *elements: dict[str, A
 
 def refused(event: Event, *blocks: dict[str, Any]) -> list[int]:
     """Ticks of the changes refused when one is made at tick 100."""
-    seen = CarriedOut(load(SCENE))
+    seen = CarriedOut(load(SCENE), TIME, ["controller"])
     seen.note(100, event)
     for each in blocks:
         seen.add(each)
@@ -59,7 +64,7 @@ def test_a_set_of_what_is_there_and_one_of_the_delay_are_no_business_of_the_bloc
 
 
 def test_blocks_wait_until_all_events_in_them_are_known_and_a_refusal_of_its_own_is_enough() -> None:
-    seen = CarriedOut(load(SCENE))
+    seen = CarriedOut(load(SCENE), TIME, ["controller"])
     seen.add(block(0, 200, 150.0, INERTIA))
     assert seen.judge(199) == []
     assert seen.tick == 0
@@ -79,3 +84,35 @@ def test_a_refusal_is_put_on_record_once_whoever_tells_it_and_nonsense_never() -
         assert refusals_of({"refused": told, "refused_changes": told}) == []
     for change in (5, None, {}, {"tick": "x"}, {"tick": 1, "swap": 3}, {"tick": 1, "set": 3}):
         assert refusals_of({"refused": ["No."], "refused_changes": [change]}) == [{"refused": "No."}]
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.0007, 0.002, 0.0035, 0.15])
+@pytest.mark.parametrize("block_ticks", [1, 7, 200])
+def test_a_delay_is_taken_as_set_only_where_the_plant_holds_the_command_of_its_tick_from_then_on(
+    delay_s: float, block_ticks: int
+) -> None:
+    """Seen in what our own plant publishes, told and not told of the change."""
+    tables: dict[str, Any] = {"duration": 0.3, "clock": {"round_trip_delay": 0.002}}
+    event: Event = {"set": {DELAY: delay_s}}
+    made, passed_over = scene(**tables, event=[{"at": 0.1, **event}]), scene(**tables)
+    for of, refused in ((made, []), (passed_over, [100] if delay_s != 0.002 else [])):
+        time, seen = Timebase.from_scene(of), CarriedOut(of, Timebase.from_scene(of), ["plant"])
+        command, n, found = run(of).plant["command"], time.steps_per_tick, list[int]()
+        seen.note(100, event)
+        for first in range(0, 300, block_ticks):
+            end = min(first + block_ticks, 300)
+            held = command[first * n : end * n + 1].tobytes()
+            seen.add_motion({"from_tick": first, "columns": {"command": held}})
+            found += [change.tick for change in seen.judge(end)]
+        assert found == refused
+        assert seen.tick == 300
+
+
+def test_a_delay_that_is_not_set_beside_what_the_controller_did_ends_the_run() -> None:
+    of = scene(duration=0.3)
+    seen = CarriedOut(of, Timebase.from_scene(of), ["plant"])
+    seen.note(100, {"set": {DELAY: 0.003, "wall.stiffness": 200.0}})
+    held = run(of).plant["command"].tobytes()
+    seen.add_motion({"from_tick": 0, "columns": {"command": held}})
+    with pytest.raises(NodeError, match=r"clock.round_trip_delay = 0.003.* was refused: .* so the run cannot go on"):
+        seen.judge(300)

@@ -32,6 +32,12 @@ ROLE = "logger"
 _LISTENS = ("plant", "controller")
 # How often books go out to viewers and the verdict is judged anew, at most.
 _STATUS_S = 0.1
+# So long another logger waits for the states from which it goes on, s.
+_STATE_S = 15.0
+_NO_STATE = (
+    "No STATE of the {} came within {:g} s: it answers no second subscription, which ZeroMQ hands to it only with "
+    "ZMQ_XPUB_VERBOSE."
+)
 
 
 class LoggerNode:
@@ -75,12 +81,13 @@ class LoggerNode:
         self._foreign = {role: not program["own"] for role, program in self.session.programs.items()}
         self.session.logger.foreign = tuple(role for role, is_foreign in self._foreign.items() if is_foreign)
         self._scene, self._time = scene, time
-        if self._foreign.get("controller") and self._publisher:  # the run's own logger
+        if any(self._foreign.values()) and self._publisher:  # the run's own logger
             from haploop.logger.carried_out import CarriedOut
 
-            self._carried_out = CarriedOut(scene)
+            self._carried_out = CarriedOut(scene, time, self.session.logger.foreign)
         self.session.logger.booked = self._publish_energy
         states: dict[str, Message] = {}
+        give_up = self._machine.now() + _STATE_S
         early: list[tuple[str, Frame]] = []
         while len(states) < len(_LISTENS):
             received = self._streams.receive(REPORT_MS)
@@ -91,7 +98,10 @@ class LoggerNode:
                 else:
                     early.append((role, frame))
             if not received:
-                self._client.waiting(0, "controller" if "plant" in states else "plant")
+                missing = "controller" if "plant" in states else "plant"
+                self._client.waiting(0, f"{missing}'s STATE")
+                if not self._publisher and self._machine.now() > give_up:
+                    raise Aborted(_NO_STATE.format(missing, _STATE_S))
             self._client.poll()
             if (why := self._leave()) is not None:
                 raise Aborted(why or "The logger left before anything came.")
@@ -113,7 +123,7 @@ class LoggerNode:
             if not self._client.until:  # the run has not begun
                 self.session.logger.count_wall_time()
             if idle:
-                self._client.waiting(self._tick, self._streams.slowest)
+                self._client.waiting(self._tick, self._awaited)
             self._drain()
             self._client.poll()
             self._note_events()
@@ -139,9 +149,16 @@ class LoggerNode:
             raise NodeError(why)
 
     @property
+    def _awaited(self) -> str:
+        """Whom this waits for, and for what of it where nothing else is missing."""
+        missing = [role for role in _LISTENS if role not in self._ended]
+        is_at_end = len(missing) == 1 or (self._client.last and self._tick >= self._client.until)
+        return f"{missing[0]}'s END" if missing and is_at_end else self._streams.slowest
+
+    @property
     def _reached(self) -> int:
         """The tick up to which all is booked, and all changes were looked for."""
-        return min(self._tick, self._carried_out.tick) if self._carried_out else self._tick
+        return int(min(self._tick, self._carried_out.tick)) if self._carried_out else self._tick
 
     @property
     def _awaits_refusals(self) -> bool:
@@ -178,6 +195,8 @@ class LoggerNode:
     def _take(self, role: str, frame: Frame) -> None:
         if frame.name == "PLANT_BLOCK":
             self.session.logger.plant_block(frame.as_dict())
+            if self._carried_out:
+                self._carried_out.add_motion(frame.as_dict())
         elif frame.name == "CONTROLLER_BLOCK":
             self.session.logger.controller_block(frame.as_dict())
             if self._carried_out:

@@ -19,7 +19,7 @@ class Node:
     Attributes:
         role, pid, lossless: as it said when it joined; a lossless node holds the clock back.
         tick: every tick before it is done.
-        heard: wall time of its last message, s.
+        joined, heard: wall time of its JOIN and of its last message, s.
         is_gone: whether a message could not be sent to it, since its connection has ended.
         program: name, version and command of what it is, as it said; each a text that may be missing.
     """
@@ -37,6 +37,9 @@ class Node:
     is_gone: bool = False
     waits_for: str = ""
     status: Message = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.joined = self.heard
 
     @property
     def is_own(self) -> bool:
@@ -69,8 +72,8 @@ class Roster:
 
     @property
     def witness(self) -> str:
-        """The role whose progress tells that changes were made: the logger sees it, where the controller is not own."""
-        return "logger" if "controller" in self._programs else "controller"
+        """The role whose progress tells that changes were made; the logger sees what others make of them."""
+        return "logger" if self._programs else "controller"
 
     def others_than(self, role: str) -> str:
         """Returns a sentence that names the programs of somebody else's in other roles; "" for none."""
@@ -135,6 +138,7 @@ class Roster:
         """Leaves some time out of the silence of every node."""
         for node in self.nodes.values():
             node.heard += seconds
+            node.joined += seconds
 
     def table(self) -> list[Message]:
         """Returns role, pid, tick, lag behind the first, whom it waits for and skipped ticks of every node.

@@ -1,4 +1,4 @@
-"""The answer to a change that a controller of somebody else's is asked for: given when it has been seen, or refused."""
+"""The answer to a change that a program of somebody else's is asked for: given when it has been seen, or refused."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from haploop.protocol.transport.wire import Message
 
 # Of the 5 s for which a terminal waits for its answer.
 _PATIENCE_S = 3.0
-_NOT_YET = "; the controller is not haploop's own, and whether it carries this out is seen when the tick is done"
+_NOT_YET = "; not all of this loop is haploop's own, and whether it carries this out is seen when the tick is done"
 
 
 def when_seen(
     clock: Clock, roster: Callable[[], Roster], text: str, data: Message
 ) -> Generator[None, None, tuple[str, Message]]:
-    """Returns a command's answer once its change has been seen in the controller's telemetry.
+    """Returns a command's answer once its change has been seen in telemetry.
 
     It yields while time goes on, and says so in the answer where time does not get there soon.
 

@@ -1,4 +1,4 @@
-"""The end of a run in which every node speaks, but a program of somebody else's lets no tick be done."""
+"""Programs of others that let no tick be done: a run ends that has one as its part, and goes on without an observer."""
 
 from __future__ import annotations
 
@@ -8,6 +8,26 @@ from haploop.launch.spec import RunFailed
 
 # What a node may take to start, s.
 START_DEADLINE_S = 20.0
+
+_WITHOUT_YOU = "the run goes on without you."
+
+
+def late_observers(roster: Roster, now: float, deadline_s: float) -> list[tuple[Node, str]]:
+    """Returns the observers that hold a run back and are silent, or not ready for too long, each with a sentence.
+
+    Args:
+        now: wall time, s.
+        deadline_s: how long one may be silent, s.
+    """
+    late = []
+    for node in roster.nodes.values():
+        if node.is_own or not node.lossless:
+            continue
+        if now - node.heard > deadline_s and node.tick <= roster.slowest():
+            late.append((node, f"Nothing was heard of you for {deadline_s:g} s; {_WITHOUT_YOU}"))
+        elif not node.ready and now - node.joined > START_DEADLINE_S:
+            late.append((node, f"You were not ready within {START_DEADLINE_S:g} s; {_WITHOUT_YOU}"))
+    return late
 
 
 class Standstill:

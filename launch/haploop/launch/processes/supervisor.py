@@ -25,7 +25,7 @@ from haploop.launch.processes.awaited import Awaited
 from haploop.launch.processes.children import Child, interrupts, start_children
 from haploop.launch.processes.foreign import Program
 from haploop.launch.processes.shown_prints import PRINTS, ShownPrints
-from haploop.launch.processes.standstill import START_DEADLINE_S, Standstill
+from haploop.launch.processes.standstill import START_DEADLINE_S, Standstill, late_observers
 from haploop.launch.spec import OutputError, RunFailed, RunSpec
 from haploop.protocol.changes import Event
 from haploop.protocol.ticks import Timebase
@@ -243,9 +243,8 @@ class Supervisor:
                     f"The {roster.label(node.role)} has not answered for {deadline_s:g} s and was {ended}; "
                     f"{self._where()} A longer wait can be set with run.deadline."
                 )
-            if not node.is_own and node.lossless and node.tick <= roster.slowest():
-                reason = f"Nothing was heard of you for {self._deadline_s:g} s; the run goes on without you."
-                self._server.drop(node, reason)
+        for node, why in late_observers(roster, now, self._deadline_s):
+            self._server.drop(node, why)
         if now >= self._probe_due:
             self._probe_due = now + _PROBE_S
             self._server.probe(roster.silent(now, _PROBE_S))

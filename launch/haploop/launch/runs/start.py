@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from haploop.logger.summary import Summary
     from haploop.protocol.changes import Event
 
-_NOT_OURS = "By its window alone, since the {} was not haploop's own and cannot be gone through again here."
+_NOT_OURS = "By its window alone, since {} not haploop's own and cannot be gone through again here."
 _NOT_REPEATED = "By its window alone, since the run is longer than {:g} s (haploop judge goes through it again)."
 
 
@@ -151,6 +151,11 @@ def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
         )
 
 
+def _named(spec: RunSpec) -> str:
+    roles = list(spec.programs)
+    return f"the {roles[0]} was" if len(roles) == 1 else f"{' and '.join(sorted(roles, reverse=True))} were"
+
+
 def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) -> Summary:
     """Returns the summary of a run of processes with the verdict it asks for: it is gone through again, without books.
 
@@ -161,7 +166,7 @@ def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) ->
     from haploop.logger.summary import REPEATED_S, write_summary
 
     if spec.programs or summary["duration_s"] > REPEATED_S:
-        why = _NOT_OURS.format(" and the ".join(spec.programs)) if spec.programs else _NOT_REPEATED.format(REPEATED_S)
+        why = _NOT_OURS.format(_named(spec)) if spec.programs else _NOT_REPEATED.format(REPEATED_S)
         summary["verdict_rule"] = f"{why} {summary['verdict_rule']}"
         write_summary(summary, spec.out)
         return summary

@@ -85,5 +85,5 @@ def _log(run: LiveRun, context: SecureContext, directory: Path, received: list[i
     except (Aborted, TelemetryGap) as error:
         summary = node.save(str(error))
         if summary is None:
-            leave(f"Run {run.id} ended before anything could be logged. {error}", FAILED)
+            leave(f"Nothing of run {run.id} could be logged. {error}", FAILED)
         return summary
