@@ -54,12 +54,13 @@ class Holdings:
 
     def __init__(self) -> None:
         self._looks: dict[Process, list[tuple[int, int]]] = {}
-        self._due: dict[Process, float] = {}
+        self._last: dict[Process, tuple[float, int]] = {}
 
-    def look(self, process: Process, events: int) -> None:
-        """Counts what the process that runs now holds, if the last look at it is long ago."""
-        if process.world.now >= self._due.setdefault(process, process.world.now + LOOK_S):
-            self._due[process] = process.world.now + LOOK_S
+    def look(self, process: Process, granted: int, events: int) -> None:
+        """Counts what the process that runs now holds, if more was granted since the last look, some time ago."""
+        when, tick = self._last.setdefault(process, (process.world.now, granted))
+        if process.world.now >= when + LOOK_S and granted > tick:
+            self._last[process] = process.world.now, granted
             self._looks.setdefault(process, []).append((entries_held(sys._getframe(1)), events))
 
     def growing(self) -> str:

@@ -81,6 +81,16 @@ class Kill(Fault):
 
 
 @dataclass(frozen=True)
+class KillLauncher(Fault):
+    """SIGKILL to the launcher, with which its nodes end a moment later; nobody is left to say anything."""
+
+    def happen(self, sim: Sim) -> None:
+        if sim.run.launcher.alive:
+            sim.killed_at.setdefault("logger", sim.world.now)
+            sim.run.launcher.kill()
+
+
+@dataclass(frozen=True)
 class Stop(Fault):
     """SIGSTOP to a process, and SIGCONT after some time."""
 

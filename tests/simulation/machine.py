@@ -172,9 +172,11 @@ class SimRun:
         return self.launcher
 
     def _orphan(self) -> None:
-        """A node ends with its launcher."""
+        """A node ends with a launcher that was killed, once it sees that its line of life is cut."""
+        if self.launcher.status >= 0 and any(process.alive for process in self.nodes.values()):
+            self.watch.fail("a node outlives its run")
         for process in self.nodes.values():
-            process.kill()
+            self.world.after(self.world.dice.expovariate(1e3), process.kill)
 
     def make_context(self, _transport: Any) -> Any:
         return self.context(self.launcher, self.disk)

@@ -21,6 +21,7 @@ from simulation.faults import (
     Fault,
     Garble,
     Kill,
+    KillLauncher,
     Late,
     LateStart,
     Refuse,
@@ -165,6 +166,7 @@ def _at_a_limit(dice: Random) -> list[tuple[str, dict[str, Any], float]]:
 # Maker of a fault -> how often it is drawn.
 _KINDS: dict[Callable[[Random], Fault], int] = {
     lambda dice: Kill(_when(dice), dice.choice(OWN)): 3,
+    lambda dice: KillLauncher(_when(dice)): 1,
     lambda dice: Stop(_when(dice), dice.choice(ALL), dice.choice((0.05, 0.5, 3.0, 8.0))): 3,
     lambda dice: Slow(_when(dice), dice.choice(ALL), dice.choice((1e-4, 1e-3, 5e-3))): 3,
     lambda dice: Late(_when(dice), dice.choice(ALL), dice.choice((1e-3, 0.02, 0.2)), dice.random()): 3,

@@ -91,6 +91,10 @@ class Sim:
         return any(self._excuses())
 
     @property
+    def was_in_order(self) -> bool:
+        return self.run.launcher.error is None and self.run.launcher.status == 0
+
+    @property
     def failing(self) -> bool:
         return self.run.named_at is not None
 
@@ -145,7 +149,7 @@ class Sim:
         if len(self.owners) > 1:
             return "two runs have one directory"
         error = self.run.launcher.error
-        if error is None:
+        if error is None:  # in order, or killed, which nothing but a fault does
             return ""
         if isinstance(error, OutputError) and self.owners == ["rival"]:
             return ""
@@ -180,13 +184,15 @@ class Sim:
             return "a node outlives its run"
         if self.run.launcher.sockets:
             return "the launcher left a socket"
+        if self.run.launcher.status < 0:  # the next ``haploop status`` clears up
+            return ""
         return f"{self.run.sockets} is still there" if self.run.sockets.exists() and self.run.clock else ""
 
     def _visitors_went_well(self) -> str:
         for process in self.visitors:
             if process.error is not None:
                 return f"{process.name} ended with a traceback:\n" + "".join(traceback.format_exception(process.error))
-        if self.run.launcher.error is None:
+        if self.was_in_order:
             events = self.run.launcher.result[1]
             for name, heard in self.heard:
                 if heard != events[: len(heard)]:
@@ -196,7 +202,7 @@ class Sim:
         return ""
 
     def _files(self, reads_log: bool) -> str:
-        summary = self.run.launcher.result[0] if self.run.launcher.error is None else None
+        summary = self.run.launcher.result[0] if self.was_in_order else None
         if summary is not None:
             events = self.run.launcher.result[1]
             written = json.loads((self.out / "summary.json").read_text(encoding="utf-8"))
@@ -268,7 +274,7 @@ def play(plan: Plan, reads_log: bool = True) -> Outcome:
         broken = sim.judge(reads_log)
         sim.world.clear_away()
         error = sim.run.launcher.error
-        how = type(error).__name__ if error else "in order"
+        how = type(error).__name__ if error else "in order" if sim.was_in_order else "launcher killed"
         return Outcome(broken, list(sim.world.history), how, [type(fault).__name__ for fault in sim.happened])
     finally:
         shutil.rmtree(directory)

@@ -195,7 +195,7 @@ class Watch:
         self.step_over()
         run = self._run
         if run and self.granted and (process is run.launcher or process in self.lossless or self._is_own(process)):
-            self.holdings.look(process, len(self.events))
+            self.holdings.look(process, self.granted, len(self.events))
         if run is None or process is not run.launcher:
             return
         for pipe, owed in self._owed.items():
