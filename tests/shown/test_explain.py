@@ -85,21 +85,39 @@ def test_every_effect_of_a_tick_costs_instructions_and_is_billed():
 
 
 def test_explain_shows_bodies_states_order_and_costs():
-    result = CliRunner().invoke(app, ["explain", str(SCENES / "premium_tap.toml"), "--set", "accelerometer.bias=1"])
+    result = CliRunner().invoke(app, ["explain", "premium_tap", "--cost", "--set", "accelerometer.bias=1"])
     assert result.exit_code == 0
-    for words in ("device 52.5 g, hand 269 g", "4: x, grip.stretch, v, grip.rate", "friction.motion", "in every tick"):
+    for words in (
+        "device 52.5 g, hand 269 g",
+        "4: x, grip.stretch, v, grip.rate",
+        "friction.motion",
+        "in every tick",
+        "2 f_c / q",
+    ):
         assert words in result.stdout, words
     assert "Note: [accelerometer] is not simulated" in result.stderr
 
 
 def test_explain_gives_one_json_object():
-    result = CliRunner().invoke(app, ["explain", str(SCENES / "fig6c.toml"), "--json"])
+    result = CliRunner().invoke(app, ["explain", str(SCENES / "fig6c.toml"), "--cost", "--json"])
     data = json.loads(result.stdout)
     assert data["states"] == ["x", "v"]
     assert [effect["name"] for effect in data["effects"]] == ["encoder"]
     assert data["elements"][0]["instructions_per_tick"] > 0
     assert len(data["absent"]) == len(EFFECTS) - 1
     assert data["modules"] == {"plant": [], "controller": []}
+    assert data["one_count"]["x_m"] == 1e-5
+    without = json.loads(CliRunner().invoke(app, ["explain", str(SCENES / "fig6c.toml"), "--json"]).stdout)
+    assert "instructions" not in str(without)
+
+
+@pytest.mark.parametrize("name", ["fig6b", "premium_press", "all_effects", "accuracy/stick_slip"])
+def test_explain_fits_eighty_columns_and_shows_brackets_as_they_are(name, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    told = CliRunner().invoke(app, ["explain", name]).stdout
+    assert max(map(len, told.splitlines())) <= 100
+    assert "[friction]" in told or name != "all_effects"
+    assert "rho(M) = 1" in told
 
 
 def test_explain_tells_every_mistake_with_exit_status_2():

@@ -1,30 +1,47 @@
-"""``haploop explain``: bodies and states of a scene, the order of its steps, and the cost of every effect."""
+"""``haploop explain``: a loop's limits, what one count comes to, the order of its steps, the cost of every effect."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from haploop.tools.cli.options import Json, Plugin, SceneFile, Set, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with, print_notes
 from haploop.tools.render.terminal import make_facts, make_table
+from haploop.tools.render.units import amount, fixed, parameters, spring
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rich.console import RenderableType
     from rich.table import Table
 
+    from haploop.controller.dissipation import Element
     from haploop.launch.plan.plan import Plan, Step
     from haploop.protocol.scene.scene import Scene
+    from haploop.tools.linear.terms import Limit, OneCount
     from haploop.tools.operations import Bill
 
 _READING = (
     "A call into NumPy counts as one instruction. An entry's are those that the loop would save without it alone; "
     "they are negative where something dearer takes its place."
 )
+_OF_LIMITS = (
+    "A limit is of the formula's own loop: passive with any passive hand, or stable for small swings in lasting "
+    "contact; haploop judge says what a run does."
+)
 
 
-def explain(scene: SceneFile, set: Set = None, plugin: Plugin = None, json: Json = False) -> None:
-    """Show what a scene comes to, and what each effect costs."""
+def explain(
+    scene: SceneFile,
+    set: Set = None,
+    plugin: Plugin = None,
+    cost: Annotated[bool, typer.Option("--cost", help="also modules, columns and instructions of each effect")] = False,
+    json: Json = False,
+) -> None:
+    """Show a loop's limits, its counts, and the order of its steps."""
     from haploop.launch.plan.plan import plan
     from haploop.launch.scene.events import elements_of, try_out
     from haploop.launch.scene.file import load
@@ -35,20 +52,27 @@ def explain(scene: SceneFile, set: Set = None, plugin: Plugin = None, json: Json
         kinds = kinds_with(plugin or [])
         resolved = load(scene, set or [], kinds)
         try_out(elements_of(resolved), kinds)
-        print_notes(resolved, kinds)
+        notes = print_notes(resolved, kinds)
         planned = plan(resolved)
-        costs = bill(resolved, planned.named, kinds)
+        costs = bill(resolved, planned.named, kinds) if cost else None
     if json:
-        print_json(as_data(resolved, planned, costs))
+        print_json(as_data(resolved, planned, costs, kinds) | {"notes": notes})
     else:
-        console().print(explanation(resolved, planned, costs))
+        console().print(explanation(resolved, planned, costs, kinds))
 
 
-def as_data(scene: Scene, planned: Plan, costs: Bill) -> dict[str, Any]:
-    """Returns the plan and its costs as one JSON object."""
-    whole = costs.whole
-    return {
+def as_data(scene: Scene, planned: Plan, costs: Bill | None, kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
+    """Returns terms, limits and plan of a scene, and costs where they were counted, as one JSON object."""
+    from haploop.tools.linear.terms import limits_of, modes, one_count
+
+    counted = one_count(scene, kinds)
+    data = {
         "title": scene.title,
+        "period_s": 1.0 / scene.clock.control_rate,
+        "delay_s": scene.clock.round_trip_delay,
+        "modes": [dataclasses.asdict(mode) for mode in modes(scene)],
+        "limits": [dataclasses.asdict(limit) for limit in limits_of(scene, kinds)],
+        "one_count": dataclasses.asdict(counted) if counted else None,
         "bodies_kg": planned.bodies,
         **{name: getattr(planned, name) for name in ("states", "memory", "modules", "columns", "counts")},
         "plant_step": [dataclasses.asdict(step) for step in planned.plant_step],
@@ -58,51 +82,101 @@ def as_data(scene: Scene, planned: Plan, costs: Bill) -> dict[str, Any]:
                 **{name: getattr(effect, name) for name in ("name", "node", "acts", "does", "columns", "counts")},
                 "modules": effect.modules_in(scene),
                 "states": effect.states_in(scene),
-                "instructions_per_tick": costs.effects[effect.name],
-                "multiplications_per_tick": costs.multiplications[1][effect.name],
             }
             for effect in planned.named
         ],
-        "elements": [
-            {"kind": element.name, "instructions_per_tick": cost}
-            for element, cost in zip(scene.dissipation, costs.elements, strict=True)
-        ],
+        "elements": [{"kind": element.name} for element in scene.dissipation],
         "absent": [effect.name for effect in planned.absent],
-        "instructions_per_tick": {"plant": whole.plant / whole.ticks, "controller": whole.controller / whole.ticks},
-        "multiplications_per_tick": costs.multiplications[0],
     }
+    if costs:
+        whole = costs.whole
+        for effect in data["effects"]:
+            effect["instructions_per_tick"] = costs.effects[effect["name"]]
+            effect["multiplications_per_tick"] = costs.multiplications[1][effect["name"]]
+        for element, instructions in zip(data["elements"], costs.elements, strict=True):
+            element["instructions_per_tick"] = instructions
+        each = {"plant": whole.plant / whole.ticks, "controller": whole.controller / whole.ticks}
+        data |= {"instructions_per_tick": each, "multiplications_per_tick": costs.multiplications[0]}
+    return data
 
 
-def explanation(scene: Scene, planned: Plan, costs: Bill) -> RenderableType:
-    """Returns the plan and its costs as tables for the terminal."""
+def explanation(scene: Scene, planned: Plan, costs: Bill | None, kinds: Mapping[str, type[Element]]) -> RenderableType:
+    """Returns the same as tables for the terminal."""
     from rich.console import Group
     from rich.text import Text
 
-    whole = costs.whole
-    moving = costs.multiplications[0]
-    loop = f"plant {whole.plant / whole.ticks:.0f}, controller {whole.controller / whole.ticks:.0f}"
-    return Group(
+    from haploop.tools.linear.terms import limits_of, one_count
+
+    parts = [
         Text(scene.title, style="bold"),
-        _facts(planned),
+        _terms(scene, planned),
+        _limits(scene, limits_of(scene, kinds)),
+        Text(_OF_LIMITS, "dim"),
+        *([_count(scene, counted)] if (counted := one_count(scene, kinds)) else []),
         _order("in every plant step", planned.plant_step),
         _order("in every tick", planned.tick),
-        _costs(scene, planned, costs),
-        Text(f"Per tick: {moving} multiplications move the bodies; bytecode instructions: {loop}. {_READING}", "dim"),
-    )
+    ]
+    if costs:
+        whole, moving = costs.whole, costs.multiplications[0]
+        loop = f"plant {whole.plant / whole.ticks:.0f}, controller {whole.controller / whole.ticks:.0f}"
+        reading = f"Per tick: {moving} multiplications move the bodies; bytecode instructions: {loop}. {_READING}"
+        parts += [_inside(planned), _costs(scene, planned, costs), Text(reading, "dim")]
+    return Group(*parts)
 
 
-def _facts(planned: Plan) -> Table:
+def _terms(scene: Scene, planned: Plan) -> Table:
+    """Makes the facts of the loop: T, masses, dampers, springs, what swings, and the two quotients of 2."""
+    from haploop.plant.chain.chain import Chain
+    from haploop.tools.linear.terms import modes
+
+    chain, rate = Chain.from_scene(scene), scene.clock.control_rate
+    period_s, delay_s = 1.0 / rate, scene.clock.round_trip_delay
+    ticks = delay_s * rate
+    dampers = [f"{name} {fixed(damping)}" for name, (_, damping) in chain.grounded.items()]
+    springs = [f"{link.name} {spring(link.stiffness)}" for link in chain.links]
+    springs += [f"hand {spring(chain.spring[0])}"] if chain.spring[0] else []
+    swings = [f"{amount(mode.frequency_Hz, 'Hz')} (damping ratio {fixed(mode.damping_ratio)})" for mode in modes(scene)]
+    own_N_s_m = next(damping for body, damping in chain.grounded.values() if body == 0)
     facts = {
-        "bodies": ", ".join(f"{name} {mass * 1e3:g} g" for name, mass in planned.bodies.items()),
-        "states": f"{len(planned.states)}: {', '.join(planned.states)}",
-        "remembered": ", ".join(f"{count} by {name}" for name, count in planned.memory.items()) or "nothing",
+        "period T, delay": f"{amount(period_s, 's')}, {amount(delay_s, 's')} ({ticks:g} tick{'s' * (ticks != 1)})",
+        "masses m": ", ".join(f"{name} {amount(mass * 1e3, 'g')}" for name, mass in planned.bodies.items()),
+        "dampers b": f"{', '.join(dampers)} N s/m",
+        "springs": ", ".join(springs) or "none",
+        "wall K": spring(scene.wall.stiffness) if scene.wall else "none",
+        "natural frequency": ", ".join(swings) or "none: nothing swings",
+        "2 b / T": f"{spring(2.0 * own_N_s_m / period_s)}, b of the {chain.bodies[0]} alone",
     }
-    for node, modules in planned.modules.items():
-        facts[f"{node} also loads"] = ", ".join(modules).replace("haploop.", "") or "nothing"
-    facts |= {f"log {channel}": ", ".join(columns) for channel, columns in planned.columns.items()}
-    facts["counts"] = ", ".join(planned.counts) or "nothing"
-    facts["absent"] = ", ".join(effect.name for effect in planned.absent)
+    if scene.friction and scene.encoder:
+        facts["2 f_c / q"] = spring(2.0 * scene.friction.kinetic / scene.encoder.resolution)
+    facts["states"] = f"{len(planned.states)}: {', '.join(planned.states)}"
     return make_facts(facts.items())
+
+
+def _limits(scene: Scene, limits: list[Limit]) -> Table:
+    from rich.text import Text
+
+    table = make_table("limit of K by", "for", "K", "the wall here", numbers=("K",), unbroken=("for",))
+    for limit in limits:
+        if limit.stiffness_N_m is None:
+            table.add_row(limit.name, limit.kind, "–", Text(limit.why_not), style="dim")
+            continue
+        here = scene.wall.stiffness if scene.wall else 0.0
+        share = f"{fixed(100.0 * here / limit.stiffness_N_m)} % of it" if here and limit.stiffness_N_m else ""
+        table.add_row(limit.name, limit.kind, spring(limit.stiffness_N_m), share)
+    return table
+
+
+def _count(scene: Scene, count: OneCount) -> Table:
+    table = make_table("one count of the encoder, in the wall and from rest", "at most", numbers=("at most",))
+    table.add_row("position", amount(count.x_m, "m"))
+    table.add_row("velocity, as estimated", amount(count.v_m_s, "m/s"))
+    table.add_row("acceleration, as estimated", amount(count.a_m_s2, "m/s²"))
+    if scene.wall:
+        table.add_row("force of the wall", amount(count.wall_N, "N"))
+    for element, force_N in zip(scene.dissipation, count.elements_N, strict=True):
+        values = parameters(element.as_dict())
+        table.add_row(f"force of {element.name}{f' ({values})' if values else ''}", amount(force_N, "N"))
+    return table
 
 
 def _order(title: str, steps: tuple[Step, ...]) -> Table:
@@ -110,6 +184,17 @@ def _order(title: str, steps: tuple[Step, ...]) -> Table:
     for step in steps:
         table.add_row(step.what, step.node, step.effect or "–")
     return table
+
+
+def _inside(planned: Plan) -> Table:
+    remembered = ", ".join(f"{count} by {name}" for name, count in planned.memory.items())
+    facts = {"remembered": remembered or "nothing"}
+    for node, modules in planned.modules.items():
+        facts[f"{node} also loads"] = ", ".join(modules).replace("haploop.", "") or "nothing"
+    facts |= {f"log {channel}": ", ".join(columns) for channel, columns in planned.columns.items()}
+    facts["counts"] = ", ".join(planned.counts) or "nothing"
+    facts["absent"] = ", ".join(effect.name for effect in planned.absent)
+    return make_facts(facts.items())
 
 
 def _costs(scene: Scene, planned: Plan, costs: Bill) -> Table:
