@@ -104,18 +104,22 @@ def test_a_run_so_short_that_nobody_waits_for_its_blocks_fails_where_they_are_mi
 
 
 @pytest.mark.slow
-def test_a_program_that_ignores_every_end_and_its_children_end_with_the_run(started: Started, tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_a_program_that_ignores_every_end_and_its_children_end_with_the_run(
+    number: signal.Signals, started: Started, tmp_path: Path
+) -> None:
+    """One of the children has a session of its own."""
     script = tmp_path / "stubborn.sh"
-    script.write_text("trap '' TERM INT HUP\nsleep 977 &\nsleep 978\n")
+    script.write_text("trap '' TERM INT HUP\nsetsid sleep 977 &\nsleep 978\n")
     run = started(node=f"sh {script}", sets=())
 
     def asleep() -> list[int]:
         return [pid for pid, _, _, words in processes() if words in ("sleep 977", "sleep 978")]
 
     wait_for("both sleepers", lambda: len(asleep()) == 2)
-    run.signal(signal.SIGKILL)
+    run.signal(number)
     wait_for("their end", lambda: not asleep())
-    run.end(-signal.SIGKILL)
+    run.end(-number if number == signal.SIGKILL else 1)
 
 
 @pytest.mark.parametrize(

@@ -55,12 +55,14 @@ class Hosts:
 
 
 @pytest.fixture
-def hosts(request, tmp_path, live_runs_here) -> Iterator[Hosts]:
+def hosts(request, tmp_path, live_runs_here, record_property) -> Iterator[Hosts]:
     if why := why_not():
         pytest.skip(f"no two hosts here: {why}")
     asked = {"address": A, **getattr(request, "param", {})}
     address = asked.pop("address")
     with two_hosts(**asked) as wire:
+        record_property("wire", wire.by)
+        print(f"Packets are delayed and lost by {wire.by}.")
         made = Hosts(wire, tmp_path, address)
         try:
             yield made

@@ -1,7 +1,8 @@
 """Two hosts on one machine: network namespaces joined by a wire that delays, loses or cuts what goes through it.
 
-The wire is a thread between two TUN devices, since not every kernel has netem; it treats each IP packet by itself, as
-netem does, so that TCP retransmits what is lost.
+The wire is a thread between two TUN devices. Where the kernel has netem, ``tc`` has it delay and lose packets at the
+devices, and the thread carries the rest; else the thread does, each IP packet by itself, as netem does, so that TCP
+retransmits what is lost.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import heapq
+import json
 import os
 import random
 import select
@@ -45,16 +47,21 @@ def _name(host: str) -> str:
 class Wire:
     """The wire between host "a" and host "b".
 
-    Attributes:
+    Args:
         delay_s: of each packet, one way.
         loss: share of the packets that are lost.
+        is_by_netem: whether the kernel sees to both.
+
+    Attributes:
+        by: what delays and loses packets.
         is_cut: nothing comes through.
-        carried, lost: packets so far.
+        carried: packets so far.
     """
 
-    def __init__(self, ends: tuple[int, int], delay_s: float, loss: float) -> None:
-        self.delay_s, self.loss, self.is_cut = delay_s, loss, False
-        self.carried = self.lost = 0
+    def __init__(self, ends: tuple[int, int], delay_s: float, loss: float, is_by_netem: bool = False) -> None:
+        self.by = "tc netem" if is_by_netem else "a thread, since this kernel has no netem"
+        self.delay_s, self.loss, self.is_cut = (0.0, 0.0, False) if is_by_netem else (delay_s, loss, False)
+        self.carried = self._lost = 0
         self._ends, self._over, self._draw = ends, False, random.Random(1)
         self._thread = threading.Thread(target=self._carry, daemon=True)
         self._thread.start()
@@ -67,7 +74,7 @@ class Wire:
             for end in select.select(self._ends, [], [], min(wait_s, 0.1))[0]:
                 packet = os.read(end, 65536)
                 if self.is_cut or self._draw.random() < self.loss:
-                    self.lost += 1
+                    self._lost += 1
                     continue
                 other = self._ends[1] if end == self._ends[0] else self._ends[0]
                 heapq.heappush(under_way, (time.monotonic() + self.delay_s, next(number), other, packet))
@@ -77,6 +84,11 @@ class Wire:
                     with contextlib.suppress(OSError):
                         os.write(other, packet)
                         self.carried += 1
+
+    @property
+    def lost(self) -> int:
+        """Packets lost so far."""
+        return self._lost + sum(_dropped(host) for host in "ab")
 
     def close(self) -> None:
         self._over = True
@@ -99,7 +111,7 @@ def two_hosts(delay_s: float = 0.0, loss: float = 0.0) -> Iterator[Wire]:
             _ip("netns", "add", _name(host))
             end = os.open("/dev/net/tun", os.O_RDWR)
             ends.append(end)
-            device = f"hl{os.getpid()}{host}"[:15]
+            device = _device(host)
             fcntl.ioctl(end, _TUNSETIFF, struct.pack("16sH22x", device.encode(), _TUN_WITHOUT_HEADER))
             _ip("link", "set", device, "netns", _name(host))
             inside = ("-n", _name(host))
@@ -107,7 +119,8 @@ def two_hosts(delay_s: float = 0.0, loss: float = 0.0) -> Iterator[Wire]:
             _ip(*inside, "addr", "add", f"{own6}/64", "dev", device, "nodad")
             for name in (device, "lo"):
                 _ip(*inside, "link", "set", name, "up")
-        wire = Wire((ends[0], ends[1]), delay_s, loss)
+        is_by_netem = shutil.which("tc") is not None and all(_shape(host, delay_s, loss) for host in "ab")
+        wire = Wire((ends[0], ends[1]), delay_s, loss, is_by_netem)
         try:
             yield wire
         finally:
@@ -115,6 +128,25 @@ def two_hosts(delay_s: float = 0.0, loss: float = 0.0) -> Iterator[Wire]:
     finally:
         for host in "ab":
             subprocess.run(["ip", "netns", "del", _name(host)], capture_output=True)
+
+
+def _device(host: str) -> str:
+    return f"hl{os.getpid()}{host}"[:15]
+
+
+def _shape(host: str, delay_s: float, loss: float) -> bool:
+    """Has the kernel delay and lose what a host sends; tells whether it can."""
+    netem = ["netem", "delay", f"{1e3 * delay_s}ms", "loss", f"{100 * loss}%", "limit", "100000"]
+    words = ["tc", "-n", _name(host), "qdisc", "add", "dev", _device(host), "root", *netem]
+    return subprocess.run(words, capture_output=True).returncode == 0
+
+
+def _dropped(host: str) -> int:
+    """Packets that the kernel has lost of what a host sent."""
+    words = ["tc", "-n", _name(host), "-s", "-j", "qdisc", "show", "dev", _device(host)]
+    said = subprocess.run(words, capture_output=True, text=True) if shutil.which("tc") else None
+    found = json.loads(said.stdout or "[]") if said else []
+    return sum(queue["drops"] for queue in found if queue["kind"] == "netem")
 
 
 def _ip(*words: str) -> None:

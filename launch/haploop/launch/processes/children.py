@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import secrets
 import signal
 import subprocess
 import sys
@@ -20,6 +21,8 @@ from haploop.protocol.transport.wire import Message
 
 # What a program of somebody else's is given after the end of its stdin to bring its device to rest.
 _TO_REST_S = 0.1
+MARK = "HAPLOOP_SEAT"
+_GUARD = 'read now || sleep {0}; kill -9 $(grep -lsz "{1}" /proc/[0-9]*/environ | tr -dc "0-9\\n"); kill -9 0'
 _NAMED = {int(number) for number in signal.Signals}
 
 
@@ -30,7 +33,7 @@ class Child:
     their file goes to the launcher's stderr, never to its stdout.
 
     A program of somebody else's writes what it prints to the file of prints from the start, and ends with all that it
-    has started in its process group.
+    has started.
 
     Attributes:
         died: a file descriptor that becomes readable, without polling, when the process has ended.
@@ -41,7 +44,7 @@ class Child:
         environment = {**os.environ}
         ask_for_one_thread(environment)
         words = program.words if program else (sys.executable, "-m", PROCESSES[role].module)
-        self._group = _Group() if program else None
+        self._group = _Group(environment) if program else None
         prints = os.open(start["prints"], os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666) if program else None
         # Where the kernel has no descriptor of a process: a pipe that is open as long as it lives.
         self.died, alive = (-1, -1) if _has_pidfd() else os.pipe()
@@ -132,22 +135,29 @@ class Child:
 class _Group:
     """A process group for a program of somebody else's: all of it ends with the launcher, whatever it does itself.
 
-    Its first process waits for the end of its stdin, which the launcher holds open, and kills the group 0.1 s later.
+    Its first process waits for a word on its stdin, which the launcher holds open, or 0.1 s beyond the end of it, and
+    kills the group; and, where there is /proc, what has left the group but kept a mark in its environment.
+
+    Args:
+        environment: of the program; the mark is put there.
 
     Attributes:
         id: of the group, which no other can have before :meth:`kill`.
     """
 
-    def __init__(self) -> None:
-        guard = ["/bin/sh", "-c", f"read _; sleep {_TO_REST_S}; kill -9 0"]
+    def __init__(self, environment: dict[str, str]) -> None:
+        mark = secrets.token_hex(16)
+        guard = ["/bin/sh", "-c", _GUARD.format(_TO_REST_S, f"^{MARK}={mark}$")]
+        environment[MARK] = mark
         nowhere = subprocess.DEVNULL
         self._guard = subprocess.Popen(guard, stdin=subprocess.PIPE, stdout=nowhere, stderr=nowhere, process_group=0)
         self.id = self._guard.pid
 
     def kill(self) -> None:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(self.id, signal.SIGKILL)
-        self._guard.communicate()
+        if self._guard.poll() is not None:  # the program has killed it
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self.id, signal.SIGKILL)
+        self._guard.communicate(b"now\n")
 
 
 def _has_pidfd() -> bool:
