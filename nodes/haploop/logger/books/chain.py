@@ -36,8 +36,8 @@ class ChainBooks:
     true books of wall and elements are those of the forces they commanded. Integrals are forms of the rates at the
     start (``ChainIntegrals``). Nothing is taken from the balance, so that its residual is a proof.
 
-    In a batch with friction all members have the same chain. Their steps are booked as if they were whole; members in
-    which friction cut a step are then booked anew, one after the other as if they were one run.
+    In a batch with friction all members have the same chain. Members in which friction cut a step are booked by
+    themselves, one after the other as if they were one run.
 
     Attributes:
         names: the books, in the order in which ``increments`` yields them; heats end in ``_heat``.
@@ -87,12 +87,14 @@ class ChainBooks:
             return column.ravel()
 
         cut = end_to_end(first_step, {name: column[:, places] for name, column in whole.items()}, in_order)
-        forces = [joined(force)[:-1] for force in commanded]
-        anew = self._of_run(0, cut, joined(tau), joined(dx)[:-1], forces)
-        for flow, of_cut in zip(self._of_run(first_step, whole, tau, dx, commanded), anew, strict=True):
-            flow = np.array(flow)
-            flow[:, places] = np.append(of_cut, 0.0).reshape(-1, rows).T[:-1]
-            yield flow
+        anew = self._of_run(0, cut, joined(tau), joined(dx)[:-1], [joined(force)[:-1] for force in commanded])
+        others = np.setdiff1d(np.arange(shape[1]), places)
+        of_others = [part if part.shape[-1] == 1 else part[:, others] for part in (tau, dx, *commanded)]
+        uncut = {name: column[:, others] for name, column in whole.items()}
+        for flow, of_cut in zip(self._of_run(first_step, uncut, *of_others[:2], of_others[2:]), anew, strict=True):
+            both = np.empty(dx.shape)
+            both[:, others], both[:, places] = flow, np.append(of_cut, 0.0).reshape(-1, rows).T[:-1]
+            yield both
 
     def _of_run(
         self, first_step: int, columns: Columns, tau: np.ndarray, dx: np.ndarray, commanded: Iterable[np.ndarray]

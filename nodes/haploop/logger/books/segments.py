@@ -196,9 +196,10 @@ class ChainForms:
             rates, products, lag_integral = made[0]
             if len(made) > 1:
                 rates, products, lag_integral = (np.stack(part, axis=-1)[..., of] for part in zip(*made, strict=True))
-            w = [*(_sum_of(row, acting, which) for row in rates), rise[which]]
+            acting_here = [column[which] for column in acting]
+            w = [*(_sum_of(row, acting_here) for row in rates), rise[which]]
             result[:-1, which] = _forms_of(products, w)
-            result[-1, which] = _sum_of(lag_integral, w, slice(None))
+            result[-1, which] = _sum_of(lag_integral, w)
         return result
 
     def forms(self, level: int, stuck: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -221,13 +222,13 @@ def _tables(chain: Chain, step_s: float) -> tuple[np.ndarray, ...]:
     return chain.rates().astype(float), *ChainForms(chain, step_s).forms(level=0, stuck=False)
 
 
-def _sum_of(factors: np.ndarray, columns: Sequence[np.ndarray], which: slice | np.ndarray) -> np.ndarray:
+def _sum_of(factors: np.ndarray, columns: Sequence[np.ndarray]) -> np.ndarray:
     """Returns the sum of factor times column in a fixed order (a matrix product may reorder with its size)."""
-    total = np.zeros_like(columns[0][which])
+    total = np.zeros_like(columns[0])
     counts: Any = (factors.any(axis=-1) if factors.ndim > 1 else factors).tolist()
     for factor, column, there in zip(factors, columns, counts, strict=True):
         if there:
-            total = total + factor * column[which]
+            total = total + factor * column
     return total
 
 
