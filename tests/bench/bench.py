@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
@@ -20,7 +21,9 @@ from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.file import load
+from haploop.logger.books import segments
 from haploop.logger.summary import versions
+from haploop.plant.friction import motion
 from haploop.tools.machine import machine
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
@@ -53,6 +56,23 @@ def _in_process_us(seconds: float) -> float:
     return (time.perf_counter() - began) / summary["ticks"] * 1e6
 
 
+def _realistic_us(seconds: float, *, by_loops: bool) -> Callable[[], float]:
+    """As ``_in_process_us`` with cable, grip and friction, the hand tapping: by loops of machine code, or without."""
+
+    def measure() -> float:
+        for loops in (motion.LOOPS, segments.LOOPS):
+            loops.pays = 0 if by_loops else float("inf")
+            assert not by_loops or loops.module(), "numba is missing, or does not work"
+        settings = [f"duration={seconds}", "run.log=none", "run.verdict=window"]
+        whole, kinds = load(SCENE.parent / "all_effects.toml", settings), registry()
+        scene = replace(whole, jitter=None, loss=None, noise=None, actuator=None)
+        began = time.perf_counter()
+        summary = run_in_process(scene, kinds)
+        return (time.perf_counter() - began) / summary["ticks"] * 1e6
+
+    return measure
+
+
 def _first_tick_s() -> float:
     """From the command line to the first tick: a run of one tick, less nothing."""
     with tempfile.TemporaryDirectory() as folder:
@@ -81,6 +101,8 @@ ROWS: dict[str, tuple[Callable[[], float], str, str, float]] = {
     "processes, d = 10 ms, every step logged": (_loop_us(0.010, "steps", 20.0), "us/tick", "ping-pong", 0.6),
     "processes, d = 10 ms, ticks logged": (_loop_us(0.010, "ticks", 20.0), "us/tick", "ping-pong", 0.4),
     "one process, books, no log": (lambda: _in_process_us(20.0), "us/tick", "plain loop", 8.0 / 2.7),
+    "the same with cable, grip, friction": (_realistic_us(10.0, by_loops=False), "us/tick", "plain loop", 0.0),
+    "the same by numba's loops": (_realistic_us(10.0, by_loops=True), "us/tick", "plain loop", 0.0),
     "haploop run of one tick, start to end": (_first_tick_s, "s", "", 0.0),
 }
 

@@ -1,4 +1,4 @@
-"""Friction moved by loops of machine code has the bits of Python and NumPy, alone and in a batch."""
+"""Friction moved and booked by loops of machine code has the bits of Python and NumPy, alone and in a batch."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from haploop.logger.books import segments
 from haploop.plant.friction import motion
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Scene
@@ -32,6 +33,7 @@ def loops(monkeypatch: pytest.MonkeyPatch) -> Any:
     pytest.importorskip("numba")
     found = motion.LOOPS.module()
     assert found is not None
+    assert segments.LOOPS.module() is not None
     return found
 
 
@@ -43,7 +45,8 @@ def scene_of(name: str) -> Scene:
 
 
 def by(pays: float, monkeypatch: pytest.MonkeyPatch, scenes: list[Scene], *, batch: bool = False) -> list[Any]:
-    monkeypatch.setattr(motion.LOOPS, "pays", pays)
+    for loops in (motion.LOOPS, segments.LOOPS):
+        monkeypatch.setattr(loops, "pays", pays)
     return together(scenes) if batch else [alone(scene) for scene in scenes]
 
 
@@ -64,6 +67,13 @@ def test_so_has_a_batch_whatever_room_there_is_for_the_pieces(
     if room:
         monkeypatch.setattr(loops, "_PIECES", room)
     assert by(0, monkeypatch, scenes, batch=True) == expected
+
+
+def test_a_rate_in_the_books_that_is_off_by_its_last_bit_is_seen(loops: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, books = [scene_of("a cable and a grip")], segments.LOOPS.module()
+    expected, made = by(np.inf, monkeypatch, scene), books.integrate
+    monkeypatch.setattr(books, "integrate", lambda rates, forms, *of: made(np.nextafter(rates, 1.0), forms, *of))
+    assert by(0, monkeypatch, scene) != expected
 
 
 def test_a_transition_that_is_off_by_its_last_bit_is_seen(loops: Any, monkeypatch: pytest.MonkeyPatch) -> None:

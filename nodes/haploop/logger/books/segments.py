@@ -11,6 +11,7 @@ import numpy as np
 from haploop.logger.books.buffers import PIECES
 from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.transition import ChainIntegrals, make_tables
+from haploop.protocol.machine_code import WhereItPays
 from haploop.protocol.trees import tree_select
 
 Columns = dict[str, np.ndarray]
@@ -20,6 +21,8 @@ BatchColumns = dict[str, Any]
 _FINEST = 62
 # So many segments of a kind are integrated by themselves; fewer together with others, each by coefficients of its own.
 _MANY = 256
+# For so many segments in all.
+LOOPS = WhereItPays("haploop.logger.books.loops", 1_000_000)
 
 
 @dataclass(frozen=True)
@@ -81,13 +84,16 @@ class Segments:
             stop_loss=table("snap_J")[begins],
         )
 
+    def kinds(self) -> np.ndarray:
+        """Returns level * 2 + is_stuck: segments of a kind last equally long, with body 0 free, or held."""
+        return self.level * 2 + self.is_stuck
+
     def groups(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray | slice]]:
         """Returns (kinds, which kind each one is, which segments): those of a kind that has many, and all others.
 
-        A kind, level * 2 + is_stuck, lasts equally long with body 0 free, or held. ``which`` selects from arrays of
-        shape (segments,), or (segments, batch): all, or those where a mask is true.
+        ``which`` selects from arrays of shape (segments,), or (segments, batch): all, or those where a mask is true.
         """
-        kinds = self.level * 2 + self.is_stuck
+        kinds = self.kinds()
         found, counts = np.unique(kinds, return_counts=True)
         if len(found) == 1:
             return [(found, np.zeros(1, np.intp), slice(None))]
@@ -188,6 +194,12 @@ class ChainForms:
         states = segments.states.copy()
         states[0] = states[0] - self._chain.spring[1] + segments.lows[0]
         acting = [of.astype(self._real, copy=False) for of in (*states, force, segments.friction, tau)]
+        if force.ndim == 1 and self._real is np.float64 and (loops := LOOPS.module_for(len(force))):
+            kinds = segments.kinds()
+            found = np.flatnonzero(np.bincount(kinds))
+            forms = [self.forms(kind // 2, kind % 2 == 1) for kind in found.tolist()]
+            which = 2 * np.searchsorted(found, kinds) + segments.is_stuck
+            return loops.integrate(np.stack([*self._rates.values()]), forms, which, acting, rise)
         groups, result = segments.groups(), np.empty((len(self.names), *force.shape))
         if len(groups) > 1:
             acting, rise = [np.broadcast_to(of, force.shape) for of in acting], np.broadcast_to(rise, force.shape)
