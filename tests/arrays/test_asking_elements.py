@@ -124,7 +124,12 @@ STABILIZERS = {
     "adaptive-inertia": {"mass": [0.002, 0.004, 0.008], "damping": [0.1, 0.2, 0.3]},
     "force-bounding": {"share": [0.8, 0.9, 1.0]},
     "force-rate": {"time": [0.0004, 0.0005, 0.0006]},
-    "virtual-coupling": {"stiffness": [200.0, 300.0, 400.0], "damping": [0.01, 0.02, 0.03], "mass": [0.01, 0.02, 0.03]},
+    "virtual-coupling": {
+        "stiffness": [200.0, 300.0, 400.0],
+        "damping": [0.01, 0.02, 0.03],
+        "mass": [0.01, 0.02, 0.03],
+        "world_ticks": [3, 3, 3],
+    },
 }
 KNOWN = KINDS | {"hearing": Hearing}
 

@@ -105,21 +105,22 @@ def leading(time: float, *, period: float) -> Law:
         spring = (yield lead)[2]
 
 
-def coupled(stiffness: float, damping: float, mass: float, wall: float, *, period: float) -> Law:
-    """A virtual tool, its implicit step solved by bisection; the wall pushes the tool alone."""
+def coupled(stiffness: float, damping: float, mass: float, wall: float, *, ticks: int = 1, period: float) -> Law:
+    """A virtual tool that steps every so many ticks, implicitly, by bisection; the wall pushes the tool alone."""
     p, _, spring = yield 0.0
-    y, inward, gap = p, 0.0, 0.0
+    y, inward, before, at_step, step, tick = p, 0.0, p, p, ticks * period, 0
 
     def excess(u: float) -> float:
-        place = y + period * u
-        pulled = stiffness * (p - place) + damping * (p - place - gap) / period
-        return mass * (u - inward) / period - pulled + wall * max(0.0, place)
+        place = y + step * u
+        pulled = stiffness * (p - place) + damping * ((p - at_step) / step - u)
+        return mass * (u - inward) / step - pulled + wall * max(0.0, place)
 
     while True:
-        u = root_of(excess)
-        y, inward, before = y + period * u, u, gap
-        gap = p - y
-        push = stiffness * gap + damping * (gap - before) / period
+        if tick % ticks == 0:
+            u = root_of(excess)
+            y, inward, at_step = y + step * u, u, p
+        push = stiffness * (p - y) + damping * ((p - before) / period - inward)
+        before, tick = p, tick + 1
         p, _, spring = yield push - spring
 
 

@@ -214,7 +214,19 @@ def test_a_virtual_coupling_rests_on_soft_and_rigid_walls_if_the_device_damps_mo
     for stiffness in (1e3, 1e6):
         assert left_swinging(0.9, stiffness, mass=0.01) < 1e-5
         assert left_swinging(0.9, stiffness, damping=0.2, mass=0.01) < 1e-5
+    assert left_swinging(0.9, 1e6, damping=0.2, mass=0.01, world_ticks=20) < 1e-5
     assert left_swinging(0.45, 1e6, mass=0.01) > 1e-3
+    assert left_swinging(0.45, 1e6, mass=0.01, world_ticks=20) > 1e-3
+
+
+@pytest.mark.parametrize("ticks", [1, 2, 20])
+def test_in_free_motion_a_tool_that_steps_slowly_drags_like_damping_of_half_kc_times_the_step_less_a_tick(
+    ticks: int,
+) -> None:
+    x = 0.5 + 0.01 * T * np.arange(1001.0)
+    coupling = {"kind": "virtual-coupling", "acts": "always", "stiffness": 800.0, "damping": 0.3, "mass": 0.004}
+    force = answered(x, {**coupling, "world_ticks": ticks})["total"][800:1000]
+    assert force.mean() == pytest.approx(-800.0 * (ticks - 1) * T / 2 * 0.01, rel=1e-6, abs=1e-10)
 
 
 def test_a_virtual_coupling_shows_no_more_stiffness_than_its_own_and_the_walls_in_a_row() -> None:
