@@ -13,10 +13,10 @@ QUICK := tests/scene tests/log tests/estimators tests/clock $(patsubst %,tests/p
   energy/test_leak energy/test_energy_per_sample sensing/test_random_stream)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo quick test slow simulate faults check bench accuracy paper comparison notebook lock clean
+.PHONY: help demo quick test slow everywhere simulate faults check bench accuracy paper comparison notebook lock clean
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' Makefile
 
 demo: $(READY) ## tell how a wall buzzes, why, and what steadies it; the last line names the figure's file
 	@$(BIN)/haploop demo
@@ -30,6 +30,9 @@ test: $(READY) ## run the tests
 
 slow: $(READY) ## run the slow tests (that there are none is no failure: pytest then exits with 5)
 	@$(BIN)/pytest -q -n auto --dist worksteal -m slow || [ $$? -eq 5 ]
+
+everywhere: $(READY) ## bits of every scene and the tests, whatever processor, CPython and dependencies (an hour; ONLY=name)
+	@PYTHONPATH=tests $(BIN)/python -m everywhere.command --only "$(ONLY)"
 
 simulate: $(READY) ## play SEEDS simulated histories from seed FROM on; stopped, it goes on where it was
 	@PYTHONPATH=tests $(BIN)/python -m simulation.command --seeds $(SEEDS) --from $(FROM)
