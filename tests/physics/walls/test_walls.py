@@ -20,6 +20,7 @@ from haploop.protocol.walls.registry import all_walls, make_wall
 from haploop.protocol.walls.wall import Wall
 from haploop.tools.linear.bounds import bounds_of
 from haploop.tools.linear.one_tick import NotLinear, OneTickMap
+from haploop.tools.linear.terms import modes
 from helpers.runs.batches import alone, pressed, together
 from helpers.scenes.least import mistakes, scene
 from oracles.wall_laws import Law, crossley, damped, leaving_speed, ridged, tap
@@ -202,6 +203,15 @@ def test_its_passivity_is_that_of_colgate_and_schenkel_and_a_bound_of_springs_al
     known = {bound.name: bound for bound in bounds_of(made)}
     assert known["Colgate & Schenkel 1997"].stiffness_N_m == pytest.approx(2 * (5.0 - 3.0) / T, rel=1e-8)
     assert not known["Exact, no delay"].applies
+
+
+def test_what_swings_on_a_damped_spring_is_damped_by_it_too_and_nothing_is_told_of_a_wall_of_no_one_stiffness() -> None:
+    """f = sqrt(K / m) / 2 pi; damping ratio (b + B) / (2 sqrt(K m))."""
+    device = {"mass": MASS, "damping": 5.0}
+    (mode,) = modes(scene(device=device, wall=wall("kelvin-voigt")))
+    assert mode.frequency_Hz == pytest.approx((STIFFNESS / MASS) ** 0.5 / (2 * np.pi), rel=1e-12)
+    assert mode.damping_ratio == pytest.approx(8.0 / (2 * (STIFFNESS * MASS) ** 0.5), rel=1e-12)
+    assert modes(scene(device=device, wall=wall("texture"))) == []
 
 
 @pytest.mark.parametrize("kind", ["hunt-crossley", "texture"])

@@ -127,6 +127,7 @@ def explanation(scene: Scene, planned: Plan, costs: Bill | None, kinds: Mapping[
 def _terms(scene: Scene, planned: Plan) -> Table:
     """Makes the facts of the loop: T, masses, dampers, springs, what swings, and the two quotients of 2."""
     from haploop.plant.chain.chain import Chain
+    from haploop.protocol.walls.registry import make_wall
     from haploop.tools.linear.terms import modes
 
     chain, rate = Chain.from_scene(scene), scene.clock.control_rate
@@ -136,14 +137,15 @@ def _terms(scene: Scene, planned: Plan) -> Table:
     springs = [f"{link.name} {spring(link.stiffness)}" for link in chain.links]
     springs += [f"hand {spring(chain.spring[0])}"] if chain.spring[0] else []
     swings = [f"{amount(mode.frequency_Hz, 'Hz')} (damping ratio {fixed(mode.damping_ratio)})" for mode in modes(scene)]
+    changes = "" if make_wall(scene.wall).stiffness_and_damping() else ", changes with the depth"
     own_N_s_m = next(damping for body, damping in chain.grounded.values() if body == 0)
     facts = {
         "period T, delay": f"{amount(period_s, 's')}, {amount(delay_s, 's')} ({ticks:g} tick{'s' * (ticks != 1)})",
         "masses m": ", ".join(f"{name} {amount(mass * 1e3, 'g')}" for name, mass in planned.bodies.items()),
         "dampers b": f"{', '.join(dampers)} N s/m",
         "springs": ", ".join(springs) or "none",
-        "wall K": spring(scene.wall.stiffness) if scene.wall else "none",
-        "natural frequency": ", ".join(swings) or "none: nothing swings",
+        "wall K": spring(scene.wall.stiffness) + changes if scene.wall else "none",
+        "natural frequency": ", ".join(swings) or ("changes with the depth" if changes else "none: nothing swings"),
         "2 b / T": f"{spring(2.0 * own_N_s_m / period_s)}, b of the {chain.bodies[0]} alone",
     }
     if scene.friction and scene.encoder:
@@ -167,12 +169,16 @@ def _limits(scene: Scene, limits: list[Limit]) -> Table:
 
 
 def _count(scene: Scene, count: OneCount) -> Table:
+    from haploop.protocol.walls.registry import make_wall
+    from haploop.tools.linear.terms import DEEP_COUNTS
+
     table = make_table("one count of the encoder, in the wall and from rest", "at most", numbers=("at most",))
     table.add_row("position", amount(count.x_m, "m"))
     table.add_row("velocity, as estimated", amount(count.v_m_s, "m/s"))
     table.add_row("acceleration, as estimated", amount(count.a_m_s2, "m/s²"))
     if scene.wall:
-        table.add_row("force of the wall", amount(count.wall_N, "N"))
+        deep = "" if make_wall(scene.wall).stiffness_and_damping() else f", {amount(DEEP_COUNTS * count.x_m, 'm')} deep"
+        table.add_row(f"force of the wall{deep}", amount(count.wall_N, "N"))
     for element, force_N in zip(scene.dissipation, count.elements_N, strict=True):
         values = parameters(element.as_dict())
         table.add_row(f"force of {element.name}{f' ({values})' if values else ''}", amount(force_N, "N"))

@@ -11,12 +11,13 @@ from haploop.controller.controller import make_params
 from haploop.controller.tick import initial_state, tick
 from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
+from haploop.protocol.walls.registry import make_wall
 from haploop.tools.linear.bounds import bounds_of
 from haploop.tools.linear.linearity import Kinds, why_not_linear
 from haploop.tools.linear.one_tick import NeverStable, NotLinear, OneTickMap
 
 # Counts inside the wall from which one is gone, ticks of rest before it and ticks watched after it.
-_DEEP_COUNTS, _TICKS = 1000, 500
+DEEP_COUNTS, _TICKS = 1000, 500
 
 
 @dataclass(frozen=True)
@@ -66,13 +67,17 @@ def modes(scene: Scene) -> list[Mode]:
     """Returns |s| / 2 pi and -Re s / |s| of every pair of complex eigenvalues s, slow ones first.
 
     Of one mass m, damped by b, on the hand's spring k and the wall's K they are sqrt((K + k) / m) / 2 pi and
-    b / (2 sqrt((K + k) m)).
+    b / (2 sqrt((K + k) m)), b with the damping of the wall. None of a wall whose stiffness changes with the depth.
     """
+    known = make_wall(scene.wall).stiffness_and_damping()
+    if known is None:
+        return []
     chain = Chain.from_scene(scene)
     rates = np.asarray(chain.rates(), float)
     size = len(chain.states)
     closed = rates[:, :size].copy()
-    closed[:, 0] -= (scene.wall.stiffness if scene.wall else 0.0) * rates[:, size]
+    closed[:, 0] -= known[0] * rates[:, size]
+    closed -= known[1] * np.outer(rates[:, size], rates[0, :size])
     pairs = sorted((s for s in np.linalg.eigvals(closed) if s.imag > 0.0), key=abs)
     return [Mode(abs(s) / (2.0 * math.pi), -s.real / abs(s)) for s in pairs]
 
@@ -98,7 +103,7 @@ def one_count(scene: Scene, kinds: Kinds) -> OneCount | None:
         return None
     count_m, wall = scene.encoder.resolution, scene.wall
     inward = 1.0 if wall and wall.occupies == "above" else -1.0
-    x_m = (wall.position if wall else 0.0) + inward * _DEEP_COUNTS * count_m
+    x_m = (wall.position if wall else 0.0) + inward * DEEP_COUNTS * count_m
     most = np.zeros(4 + len(scene.dissipation))
     for step_m in (count_m, -count_m):
         params = make_params(replace(scene, event=()), 1.0 / scene.clock.control_rate, dict(kinds))
