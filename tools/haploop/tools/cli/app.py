@@ -11,7 +11,8 @@ from haploop.tools.cli.explain import explain
 from haploop.tools.cli.join import join
 from haploop.tools.cli.live_commands import attach, keys, pace, pause, resume, set_, status, step, stop, swap, undo
 from haploop.tools.cli.run_command import run
-from haploop.tools.cli.scenes import check, export, judge, plot, plugins, replay
+from haploop.tools.cli.runs_beside import diff, plot
+from haploop.tools.cli.scenes import check, export, judge, plugins, replay
 from haploop.tools.cli.study_commands import advise, dissipate, paper, sweep
 from haploop.tools.cli.view import view
 from haploop.tools.compare.command import compare
@@ -47,7 +48,7 @@ def haploop(
 # In the order in which the help lists them.
 for command in (
     demo, run, scenes, new, check, explain, plugins, status, pause, resume, step, pace, stop, swap, set_, undo, attach,
-    view, keys, join, plot, replay, judge, export, export_fmu, cost, sweep, dissipate, paper, advise,
+    view, keys, join, plot, diff, replay, judge, export, export_fmu, cost, sweep, dissipate, paper, advise,
     compare,
 ):  # fmt: skip
     settings = {"ignore_unknown_options": True} if command in (step, pace) else None  # -1 is a number there

@@ -88,24 +88,6 @@ def _parameters(element: type[Element]) -> dict[str, dict[str, str | float | Non
     }
 
 
-def plot(directory: Directory) -> None:
-    """Draw a run, or the map of a sweep as far as it goes. The last line names the figure's file."""
-    from haploop.tools.figure.data import FigureError
-    from haploop.tools.sweep.table import is_sweep
-
-    if is_sweep(directory):
-        from haploop.tools.sweep.map.figure import draw_map as draw
-    else:
-        from haploop.tools.figure.run_figure import draw
-
-    with plain_errors():
-        try:
-            target = draw(directory)
-        except FigureError as error:
-            leave(str(error), WRONG_USE)
-    print(target)
-
-
 def replay(directory: Directory, json: Json = False) -> None:
     """Repeat a run from its log and say whether all bits agree."""
     from haploop.launch.runs import replay as runs

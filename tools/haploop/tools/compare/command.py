@@ -40,7 +40,9 @@ def compare(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Compare every stabilizer, each tuned alike: how stiff a wall it renders safely, what it costs, where it breaks.
+    """Compare every stabilizer, each tuned alike.
+
+    How stiff a wall it renders safely, what it costs, where it breaks.
 
     Can be stopped; the same command with --out DIR, the directory of the first, goes on.
     """

@@ -1,0 +1,114 @@
+"""Runs beside one another: the overlay of their figures, and the table of what they differ in."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from haploop.launch.runs.start import prepare, run
+from haploop.launch.scene.bundled import of_name
+from haploop.tools.cli.app import app
+from haploop.tools.figure.data import RunData
+from haploop.tools.figure.difference import Parting, difference, unlike_keys
+from haploop.tools.figure.overlay import MOST_RUNS, labels, make_overlay
+from helpers.shown import artists
+
+PNG = b"\x89PNG"
+
+
+def made(directory: Path, *overrides: str) -> Path:
+    scene = of_name("fig6c", "scenes")
+    assert scene
+    quick = ["duration=2", 'run.verdict="window"']
+    run(prepare(scene, [*quick, *overrides], out=directory), in_process=True)
+    return directory
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    base = tmp_path_factory.mktemp("runs")
+    found = {
+        "a": made(base / "a"),
+        "again": made(base / "again", "title=again"),
+        "swapped": made(base / "swapped", "title=[swapped]", "event.0.at=1", "event.0.set={'wall.stiffness'=90.0}"),
+        "slow": made(base / "slow", "clock.control_rate=500", "clock.round_trip_delay=0"),
+    }
+    log = (found["a"] / "log.mcap").read_bytes()
+    found["killed"] = base / "killed"
+    found["killed"].mkdir()
+    (found["killed"] / "log.mcap").write_bytes(log[: len(log) * 8 // 10])
+    return found
+
+
+def data(runs: dict[str, Path], *names: str) -> list[RunData]:
+    return [RunData.from_directory(runs[name]) for name in names]
+
+
+def haploop(*words: object):
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def test_two_runs_of_one_scene_do_not_part_and_differ_in_their_names_alone(runs):
+    found = difference(*data(runs, "a", "again"))
+    assert (found.parting, found.ticks, found.scene) == (None, 2000, {})
+    assert found.names[1] == "again"
+    assert all(first == second for first, second in found.results.values())
+    assert all(first == second for first, second in found.energies_J.values())
+
+
+def test_runs_part_at_the_first_tick_in_contact_after_their_only_event(runs):
+    found = difference(*data(runs, "a", "swapped"))
+    assert list(found.scene) == ["event.0.at", "event.0.set.wall.stiffness"]
+    first, second = data(runs, "a", "swapped")
+    contact = 1000 + int(np.argmax(first.controller["in_contact"][1000:]))
+    assert found.parting == Parting(contact, contact / 1000.0, "wall")
+    assert np.array_equal(first.controller["total"][:contact], second.controller["total"][:contact])
+    assert found.results["trajectory_sha256"][0] != found.results["trajectory_sha256"][1]
+
+
+def test_of_a_killed_run_the_ticks_that_are_there_are_compared_and_no_energies(runs):
+    found = difference(*data(runs, "a", "killed"))
+    assert found.parting is None
+    assert 0 < found.ticks < 2000
+    assert found.results["ended"] == ("done", "killed")
+    assert {second for _, second in found.energies_J.values()} == {None}
+
+
+def test_ticks_of_unlike_clocks_are_not_compared(runs):
+    found = difference(*data(runs, "a", "slow"))
+    assert found.parting is None
+    assert found.why_not == "Ticks are not compared: one run has 1000 a second, the other 500."
+
+
+def test_diff_tells_it_as_a_table_and_as_one_json_object(runs):
+    told = haploop("diff", runs["a"], runs["swapped"])
+    assert told.exit_code == 0
+    assert re.search(r"They part at tick (1\d\d\d), at 1.\d+ s, in wall\.", told.stdout)
+    assert "[swapped]" in told.stdout, "brackets are no markup"
+    assert json.loads(haploop("diff", runs["a"], runs["swapped"], "--json").stdout)["parting"]["column"] == "wall"
+    assert "holds no log.mcap" in haploop("diff", runs["a"], runs["a"].parent).stderr
+
+
+def test_an_overlay_draws_every_run_with_its_name_and_what_differs(runs):
+    given = data(runs, "a", "swapped", "killed", "slow")
+    figure = make_overlay(given)
+    assert len(artists(figure, "position")) == 2 * len(given) - 1, "the killed one has no close view"
+    told = [text.get_text() for text in artists(figure, "label")]
+    assert told == labels(given)
+    assert "clock.control_rate 500" in told[3]
+    assert labels(data(runs, "a", "a")) == [given[0].scene.title] * 2
+    assert list(unlike_keys([given[0].scene, given[3].scene])) == ["clock.control_rate", "clock.round_trip_delay"]
+    drawn = artists(figure, "energy")[0].get_ydata()
+    assert drawn[-1] == pytest.approx(given[0].books()[-1].true_J[-1] * 1e3)
+
+
+def test_plot_of_several_runs_writes_one_figure_and_refuses_what_it_cannot_draw(runs, tmp_path):
+    done = haploop("plot", runs["a"], runs["again"], "--out", tmp_path / "both.png")
+    assert done.exit_code == 0
+    assert (tmp_path / "both.png").read_bytes().startswith(PNG)
+    many = haploop("plot", *[runs["a"]] * (MOST_RUNS + 1))
+    assert many.exit_code == 2
+    assert "At most 6 runs can be told apart in one figure, but 7 were given." in many.stderr

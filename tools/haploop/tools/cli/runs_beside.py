@@ -1,0 +1,114 @@
+"""The commands that show runs, or set them beside one another."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from haploop.tools.cli.options import WRONG_USE, Directory, Json, leave, plain_errors, print_json
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from haploop.tools.figure.difference import Difference
+
+# Words of the results, with the unit of a number.
+_WORDS = {
+    "verdict": ("verdict", ""),
+    "ended": ("ended", ""),
+    "logged_s": ("log ends at", "s"),
+    "oscillation_m": ("oscillation at its end", "m"),
+    "frequency_Hz": ("pushed, it swings at", "Hz"),
+    "trajectory_sha256": ("trajectory hash", ""),
+}
+
+
+def plot(
+    directory: Annotated[list[Path], typer.Argument(help="directories of runs, or one of a sweep", show_default=False)],
+    out: Annotated[Path | None, typer.Option(help="the figure's file [in the first directory]")] = None,
+) -> None:
+    """Draw a run, several over one another, or a sweep's map.
+
+    A run that was killed is drawn as far as its log goes, a sweep as far as it has come. The last line names the
+    figure's file.
+    """
+    from haploop.tools.figure.data import FigureError
+    from haploop.tools.figure.overlay import draw_overlay
+    from haploop.tools.figure.run_figure import draw
+    from haploop.tools.sweep.table import is_sweep
+
+    with plain_errors():
+        try:
+            if sweeps := [path for path in directory if is_sweep(path)]:
+                if len(directory) > 1:
+                    leave(f"{sweeps[0]} is a sweep, which is drawn by itself; runs are drawn together.", WRONG_USE)
+                from haploop.tools.sweep.map.figure import draw_map as draw
+            target = draw(directory[0], out) if len(directory) == 1 else draw_overlay(directory, out)
+        except FigureError as error:
+            leave(str(error), WRONG_USE)
+    print(target)
+
+
+def diff(first: Directory, second: Directory, json: Json = False) -> None:
+    """Say what two runs differ in, and at which tick they part."""
+    from haploop.tools.figure.data import FigureError
+    from haploop.tools.figure.difference import difference_of
+    from haploop.tools.render.terminal import console
+
+    with plain_errors():
+        try:
+            found = difference_of(first, second)
+        except FigureError as error:
+            leave(str(error), WRONG_USE)
+    if json:
+        print_json(dataclasses.asdict(found))
+    else:
+        console().print(difference_table(found))
+
+
+def difference_table(found: Difference) -> RenderableType:
+    """Makes the table of two runs: what their scenes differ in, what came of them, their energies, where they part."""
+    from rich.console import Group
+    from rich.text import Text
+
+    from haploop.tools.figure.difference import scene_value
+    from haploop.tools.render.terminal import make_table, verdict_style
+    from haploop.tools.render.units import amount
+
+    table = make_table("", "first", "second")
+    table.add_row("name", *(Text(name, "bold") for name in found.names))
+    table.add_section()
+    for key, pair in found.scene.items():
+        table.add_row(Text(key), *(Text(scene_value(value)) for value in pair))
+    if not found.scene:
+        table.add_row("scene", "the same", "the same")
+    table.add_section()
+    for name, pair in found.results.items():
+        words, unit = _WORDS[name]
+        told = [_result(value, unit) for value in pair]
+        styles = [verdict_style(text) if name == "verdict" else "" for text in told]
+        table.add_row(words, *(Text(text, style) for text, style in zip(told, styles, strict=True)))
+    table.add_section()
+    for name, pair in found.energies_J.items():
+        table.add_row(Text(name), *(amount(value, "J") for value in pair))
+    return Group(table, Text(parting_words(found), "bold"))
+
+
+def parting_words(found: Difference) -> str:
+    """Returns the sentence on where two runs part."""
+    if found.why_not:
+        return found.why_not
+    if found.parting is None:
+        return f"Every bit of the {found.ticks} ticks that both logs hold is the same."
+    return f"They part at tick {found.parting.tick}, at {found.parting.at_s:g} s, in {found.parting.column}."
+
+
+def _result(value: Any, unit: str) -> str:
+    from haploop.tools.render.units import amount
+
+    if value is None:
+        return "–"
+    return amount(value, unit) if unit else f"{value}"[:16]

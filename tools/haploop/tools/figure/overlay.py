@@ -1,0 +1,137 @@
+"""The figure of several runs over one another: position, force and energy, with what their scenes differ in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from haploop.tools.figure import style
+from haploop.tools.figure.data import Book, FigureError, RunData
+from haploop.tools.figure.difference import scene_value, unlike_keys
+from haploop.tools.figure.run_figure import key_numbers
+from haploop.tools.figure.time import MM, line
+from haploop.tools.render.terminal import told
+from haploop.tools.render.units import amount, prefix_for
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+
+MOST_RUNS = 6
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#332288")
+# Of equal lines the one below is seen beside the one above.
+_WIDTHS = (2.8, 2.1, 1.6, 1.2, 0.9, 0.6)
+# Keys in which scenes differ that a line of the legend has room for.
+_MOST_KEYS = 3
+
+
+def draw_overlay(directories: Sequence[Path], target: Path | None = None) -> Path:
+    """Draws several runs over one another into a file, and returns that.
+
+    Args:
+        directories: of runs, two to ``MOST_RUNS``; of one that was killed, what its log holds is drawn.
+        target: file of the figure; ``overlay.png`` in the first directory when None.
+
+    Raises:
+        FigureError: matplotlib is missing, there is nothing to draw, there are too many, or the file cannot be written.
+        LogError, SceneError: a directory's files cannot be read.
+    """
+    if len(directories) > MOST_RUNS:
+        raise FigureError(
+            f"At most {MOST_RUNS} runs can be told apart in one figure, but {len(directories)} were given."
+        )
+    runs = [RunData.from_directory(directory) for directory in directories]
+    return style.write_figure(make_overlay(runs), target or directories[0] / "overlay.png")
+
+
+def make_overlay(runs: Sequence[RunData]) -> Figure:
+    """Makes the figure of several runs; FigureError where matplotlib is missing."""
+    figure = style.empty_figure(15.0, 9.0 + 0.25 * len(runs))
+    header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.02 + 0.025 * len(runs), 1.0))[:, 0]
+    span_s = min(run.span_s[0] for run in runs), max(run.span_s[1] for run in runs)
+    close_s = max(run.close_s() for run in runs)  # the one that begins last
+    grid = body.add_gridspec(3, 2, width_ratios=(1.9, 1.25))
+    for column, (seen_s, more) in enumerate(((span_s, ""), (close_s, ", close view"))):
+        _positions(body.add_subplot(grid[0, column]), runs, seen_s, f"Position{more}")
+        _forces(body.add_subplot(grid[1, column]), runs, seen_s, f"Force of the controller{more}")
+    _energies(body.add_subplot(grid[2, :]), runs, span_s)
+    body.align_ylabels()
+    for place, (label, run) in enumerate(zip(labels(runs), runs, strict=True)):
+        y = 1.0 - (place + 0.5) / len(runs)
+        _head(header, run, label, y, _COLOURS[place])
+    return figure
+
+
+def labels(runs: Sequence[RunData]) -> list[str]:
+    """Returns for each run its name and what of its scene is not the same in all."""
+    unlike = unlike_keys([run.scene for run in runs])
+    told_keys = list(unlike)[:_MOST_KEYS]
+    more = f" and {len(unlike) - _MOST_KEYS} more" if len(unlike) > _MOST_KEYS else ""
+    if not unlike:
+        return [run.scene.title for run in runs]
+    told_values = [[f"{key} {scene_value(unlike[key][place])}" for key in told_keys] for place in range(len(runs))]
+    return [f"{run.scene.title} ({', '.join(values)}{more})" for run, values in zip(runs, told_values, strict=True)]
+
+
+def _head(header: Figure | SubFigure, run: RunData, label: str, y: float, colour: str) -> None:
+    """Writes a run's line of the legend: colour, verdict, name, what differs, numbers."""
+    from matplotlib.lines import Line2D
+
+    header.add_artist(Line2D([0.008, 0.028], [y, y], color=colour, linewidth=3.0, gid="run"))
+    word = told(run.summary) if run.summary else "no verdict"
+    look: dict[str, Any] = {"va": "center", "fontsize": style.TEXT + 1}
+    header.text(0.034, y, word, color=style.VERDICTS.get(word, style.GREY), fontweight="bold", gid="verdict", **look)
+    name = header.text(0.115, y, label, color=style.INK, gid="label", **look)
+    style.fit_text(name, header.bbox.width * 0.56)
+    numbers = header.text(0.69, y, _numbers(run), color=style.GREY, gid="numbers", **look)
+    style.fit_text(numbers, header.bbox.width * 0.3, smallest=0.6)
+
+
+def _numbers(run: RunData) -> str:
+    if not run.summary:
+        return key_numbers(run)[0]
+    frequency = run.summary.get("stability", {}).get("frequency_Hz")
+    words = f"oscillation {amount(run.summary['window']['oscillation_m'], 'm')} at its end"
+    return f"{words}; pushed, {amount(frequency, 'Hz')}" if frequency else words
+
+
+def _positions(ax: Axes, runs: Sequence[RunData], span_s: tuple[float, float], title: str) -> None:
+    for run, colour, width in zip(runs, _COLOURS, _WIDTHS, strict=False):
+        inside = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
+        if inside.any():
+            line(ax, run.t_s[inside], run.x_m[inside] * MM, "_", colour, linewidth=width, gid="position")
+        if run.history.walls:
+            edges = np.array(span_s)
+            look: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 1, "gid": "wall"}
+            ax.plot(edges, run.wall_at(edges)[0] * MM, color=colour, **look)
+    _dress(ax, title, "position (mm), walls dashed", span_s)
+
+
+def _forces(ax: Axes, runs: Sequence[RunData], span_s: tuple[float, float], title: str) -> None:
+    for run, colour, width in zip(runs, _COLOURS, _WIDTHS, strict=False):
+        inside = (run.ticks_s >= span_s[0]) & (run.ticks_s <= span_s[1])
+        if inside.any():
+            total = run.controller["total"][inside]
+            line(ax, run.ticks_s[inside], total, "_", colour, held=True, linewidth=width, gid="force")
+    _dress(ax, title, "force on the device (N)", span_s)
+
+
+def _energies(ax: Axes, runs: Sequence[RunData], span_s: tuple[float, float]) -> None:
+    """Draws the true books of wall and elements together, which is what the controller has taken out."""
+    taken: list[Book | None] = [next(iter(run.books()[-1:]), None) for run in runs]
+    ends = [np.abs(book.true_J[np.isfinite(book.true_J)]).max(initial=0.0) for book in taken if book]
+    factor, letter = prefix_for(ends)
+    for book, colour, width in zip(taken, _COLOURS, _WIDTHS, strict=False):
+        if book:
+            line(ax, book.t_s, book.true_J / factor, "_", colour, linewidth=width, gid="energy")
+    ax.axhline(0.0, color=style.GREY, linewidth=0.8, zorder=0)
+    title = "Energy that wall and elements take out of the device (given to it below 0)"
+    _dress(ax, title, f"energy ({letter}J)", span_s)
+
+
+def _dress(ax: Axes, title: str, y_label: str, span_s: tuple[float, float]) -> None:
+    style.dress(ax, title, "time (s)", y_label)
+    ax.set_xlim(*span_s)
