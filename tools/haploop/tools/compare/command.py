@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from haploop.logger.summary import finite
 from haploop.tools.cli.options import FAILED, WRONG_USE, Json, Plugin, Set, leave, plain_errors, print_json
 
 _NO_BOUND = "Force bounding is left out: it counts on the damping that the device declares, which is 0 here."
@@ -61,6 +60,7 @@ def compare(
 
 def _compare(subject: Subject, grid: bool, workers: int | None, out: Path | None, as_json: bool) -> None:
     from haploop.launch.spec import make_output
+    from haploop.logger.summary import finite
     from haploop.tools.advise.families import FORCE_BOUNDING
     from haploop.tools.advise.walls.cases import make_loop
     from haploop.tools.compare.bench import Effort
