@@ -1,0 +1,62 @@
+"""Hooks of the documentation's build: pages from elsewhere in the repository, pages generated from code, links.
+
+MkDocs calls ``on_files`` and ``on_page_markdown``. Links that lead to no page, such as those to source files, become
+plain text: the site stands by itself.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from mkdocs.structure.files import File, Files
+
+sys.path.insert(0, str(Path(__file__).parent))
+import reference
+
+HOUSE = Path(__file__).parents[2]
+# Pages that lie outside of docs/, by their path within the site.
+ELSEWHERE = {
+    "index.md": "README.md",
+    "contributing.md": "CONTRIBUTING.md",
+    "changelog.md": "CHANGELOG.md",
+    "protocol.md": "protocol/README.md",
+    "examples.md": "examples/README.md",
+}
+_LINK = re.compile(r"(!?)\[((?:[^\]\[]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Adds the pages from elsewhere and those that are generated."""
+    for page, path in ELSEWHERE.items():
+        files.append(File.generated(config, page, content=(HOUSE / path).read_text(encoding="utf-8")))
+    for page, make in reference.PAGES.items():
+        files.append(File.generated(config, page, content=make()))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
+    """Returns the page with its links leading to pages of the site."""
+    here = page.file.src_uri
+    folder = posixpath.dirname(ELSEWHERE[here] if here in ELSEWHERE else f"docs/{here}")
+    pages = {path: name for name, path in ELSEWHERE.items()}
+
+    def led(match: re.Match[str]) -> str:
+        picture, text, link = match.groups()
+        target, _, anchor = link.partition("#")
+        if "://" in link or not target:
+            return match[0]
+        path = posixpath.normpath(posixpath.join(folder, target))
+        found = pages.get(path) or (path.removeprefix("docs/") if path.startswith("docs/") else "")
+        if not found or files.get_file_from_path(found) is None:
+            if picture or not (HOUSE / path).exists():
+                return match[0]  # which the build then complains of
+            return text
+        relative = posixpath.relpath(found, posixpath.dirname(here) or ".")
+        return f"{picture}[{text}]({relative}{'#' * bool(anchor)}{anchor})"
+
+    parts = re.split(r"(^```.*?^```$)", markdown, flags=re.MULTILINE | re.DOTALL)
+    return "".join(part if part.startswith("```") else _LINK.sub(led, part) for part in parts)
