@@ -13,7 +13,7 @@ QUICK := tests/scene tests/log tests/estimators tests/clock $(patsubst %,tests/p
   energy/test_leak energy/test_energy_per_sample sensing/test_random_stream)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo quick test slow everywhere simulate faults check bench accuracy paper comparison notebook lock clean
+.PHONY: help demo quick test slow everywhere simulate faults check bench accuracy paper comparison docs pictures notebook lock clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' Makefile
@@ -71,6 +71,13 @@ comparison: $(READY) ## compare every stabilizer on three devices and write docs
 	@$(BIN)/haploop compare omega3 --delay "1 ms" --out runs/comparison/omega3
 	@$(BIN)/python -m haploop.tools.compare.page runs/comparison docs
 
+docs: $(READY) ## make the documentation as a site in site/ (index.html); a warning is an error
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo site/index.html
+
+pictures: $(READY) ## make the pictures of README's walk anew (some ten minutes, most of it advice)
+	@$(BIN)/python docs/site/pictures.py docs/pictures
+
 notebook: $(READY) ## run docs/notebook.ipynb anew and keep its figures
 	@$(BIN)/python -m haploop.tools.notebook docs/notebook.ipynb
 
@@ -80,7 +87,7 @@ lock: ## pin every dependency anew with its hashes in requirements.lock (needs u
 	  --no-emit-index-url --no-emit-find-links --no-annotate --no-header
 
 clean: ## remove the virtual environment, the runs and every cache
-	rm -rf .venv runs dist build .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv runs site dist build .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find nodes protocol launch tools tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # A new lock means a new environment; a change of pyproject.toml only means installing haploop itself again.

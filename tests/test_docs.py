@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
+import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer.main
+
+from haploop.launch.scene.bundled import bundled
+from haploop.tools.cli.app import app
 
 HOUSE = Path(__file__).parents[1]
 DOCUMENTS = [HOUSE / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "protocol/README.md")]
-DOCUMENTS += sorted((HOUSE / "docs").glob("*.md"))
+DOCUMENTS += sorted((HOUSE / "docs").rglob("*.md"))
+# Pages of the site that its build generates.
+GENERATED = set(re.findall(r'"(reference/\w+\.md)"', (HOUSE / "docs/site/reference.py").read_text(encoding="utf-8")))
+FOR_USERS = [path for path in DOCUMENTS if path.name not in ("CHANGELOG.md", "CONTRIBUTING.md")]
 TARGETS = set(re.findall(r"^([a-z]+):", (HOUSE / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
 # Files that a page tells to write.
 EXAMPLES = {
@@ -48,7 +58,9 @@ def test_every_path_that_a_document_names_exists(document: Path) -> None:
 def test_every_link_of_a_document_leads_to_a_file(document: Path) -> None:
     links = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", document.read_text(encoding="utf-8"))
     local = [link for link in links if "://" not in link]
-    assert [link for link in local if not (document.parent / link).exists()] == []
+    missing = [document.parent / link for link in local if not (document.parent / link).exists()]
+    generated = [HOUSE / "docs/tutorials/.." / page for page in GENERATED]
+    assert [link for link in missing if link not in generated] == []
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
@@ -84,3 +96,51 @@ def test_every_module_that_a_document_starts_or_imports_exists(document: Path) -
     modules = set(re.findall(r"(?:from|-m) (haploop(?:\.[a-z_0-9]+)+)", text))
     examples = {path.split("/", 1)[1].removesuffix(".py").replace("/", ".") for path in EXAMPLES}
     assert [module for module in modules - examples if not importlib.util.find_spec(module)] == []
+
+
+def wrong_words(line: str) -> list[str]:
+    """What is no command or no option of it in a line such as ``haploop run my.toml --view   # comment``."""
+    words = shlex.split(line.partition("   #")[0].partition(" | ")[0], comments=True)[1:]
+    commands: Any = typer.main.get_command(app)
+    if not words or words[0].startswith("-"):
+        return []
+    command = commands.commands.get(words[0])
+    if command is None:
+        return [words[0]]
+    known = {word for one in command.params for word in (*one.opts, *one.secondary_opts)} | {"--help", "-h"}
+    return [word for word in words[1:] if word.startswith("--") and word.partition("=")[0] not in known]
+
+
+def command_lines(text: str) -> list[str]:
+    """Lines of code blocks that begin with ``haploop``, those that go on with a backslash in one."""
+    blocks = re.findall(r"^```(?:bash|sh)?\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    return [line for block in blocks for line in block.replace("\\\n", " ").splitlines() if line.startswith("haploop ")]
+
+
+@pytest.mark.parametrize("document", FOR_USERS, ids=lambda path: path.name)
+def test_every_command_that_a_document_shows_is_one_and_takes_its_options(document: Path) -> None:
+    lines = command_lines(document.read_text(encoding="utf-8"))
+    assert {line: wrong for line in lines if (wrong := wrong_words(line))} == {}
+
+
+def test_a_command_or_an_option_that_is_none_is_found() -> None:
+    assert wrong_words("haploop dance my.toml") == ["dance"]
+    assert wrong_words("haploop run my.toml --set a=1 --slowly   # --not-this") == ["--slowly"]
+    assert command_lines("```\nhaploop run a \\\n  --view\n```\n") == ["haploop run a    --view"]
+
+
+def test_every_scene_sweep_and_device_that_readme_runs_comes_with_haploop_or_was_made_before() -> None:
+    lines = command_lines((HOUSE / "README.md").read_text(encoding="utf-8"))
+    of = {"run": "scenes", "advise": "scenes", "sweep": "sweeps", "check": "scenes"}
+    named = [(words[1], words[2]) for line in lines if (words := shlex.split(line))[1] in of]
+    assert len(named) >= 4
+    assert [name for command, name in named if name not in bundled(of[command])] == []
+
+
+@pytest.mark.parametrize("document", FOR_USERS, ids=lambda path: path.name)
+def test_every_python_block_of_a_document_compiles_and_imports_what_there_is(document: Path) -> None:
+    for block in re.findall(r"^```python\n(.*?)^```", document.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL):
+        for node in ast.walk(ast.parse(block)):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("haploop"):
+                module = importlib.import_module(node.module or "")
+                assert [each.name for each in node.names if not hasattr(module, each.name)] == [], node.module

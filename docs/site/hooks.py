@@ -41,7 +41,7 @@ def on_files(files: Files, config: Any) -> Files:
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
     """Returns the page with its links leading to pages of the site."""
     here = page.file.src_uri
-    folder = posixpath.dirname(ELSEWHERE[here] if here in ELSEWHERE else f"docs/{here}")
+    folder = posixpath.dirname(ELSEWHERE.get(here, f"docs/{here}"))
     pages = {path: name for name, path in ELSEWHERE.items()}
 
     def led(match: re.Match[str]) -> str:

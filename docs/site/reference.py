@@ -67,7 +67,7 @@ def scene() -> str:
 
 
 _SCENE = (
-    "A scene is a TOML file. A table that is absent is an effect that is not simulated. Numbers are SI; text carries its "
+    "A scene is a TOML file. A table that is absent is an effect that is not simulated. Numbers are SI; text has its "
     'unit: `"0.2 N/mm"`, `"2 ms"`. `extends` names one file or several that it is laid over, own files or what '
     "`haploop scenes` lists. `haploop check --schema` prints this as JSON Schema for an editor."
 )
@@ -85,7 +85,9 @@ def _heading(key: str, one: Mapping[str, Any], name: str, several: bool) -> str:
 
 
 def _kind(name: str) -> str:
-    return "".join(f"-{letter.lower()}" if letter.isupper() and at else letter.lower() for at, letter in enumerate(name))
+    return "".join(
+        f"-{letter.lower()}" if letter.isupper() and at else letter.lower() for at, letter in enumerate(name)
+    )
 
 
 def _table(heading: str, table: Mapping[str, Any]) -> list[str]:
@@ -106,8 +108,8 @@ def _keys(properties: Mapping[str, Any]) -> str:
 
 def _choices(one: Mapping[str, Any]) -> str:
     given = one.get("enum") or ([one["const"]] if "const" in one else [])
-    kind = one.get("type", "")
-    return " or ".join(f'`"{each}"`' for each in given) or (kind if isinstance(kind, str) else " or ".join(kind))
+    kinds = one.get("type") or [each.get("type", "") for each in one.get("anyOf", [])]
+    return " or ".join([f'`"{each}"`' for each in given] or ([kinds] if isinstance(kinds, str) else kinds))
 
 
 def _plain(text: str) -> str:
@@ -125,20 +127,23 @@ def commands() -> str:
     group: Any = typer.main.get_command(app)
     for name, command in group.commands.items():
         arguments = [one for one in command.params if one.param_type_name == "argument"]
-        usage = " ".join(f"{one.make_metavar(_context(command, name))}" for one in arguments)
-        parts += [f"## haploop {name}", f"```\nhaploop {name} [OPTIONS] {usage}".rstrip() + "\n```", _prose(command.help)]
-        rows = [
-            (f"`{', '.join([*one.opts, *one.secondary_opts])}`" if one in command.params else "", _plain(one.help or ""))
-            for one in command.params
-            if not getattr(one, "hidden", False)
+        usage = " ".join(one.name.upper() if one.required else f"[{one.name.upper()}]" for one in arguments)
+        parts += [
+            f"## haploop {name}",
+            f"```\nhaploop {name} [OPTIONS] {usage}".rstrip() + "\n```",
+            _prose(command.help),
         ]
-        rows = [row for row in rows if row[1]]
+        rows = [(_words(one), _plain(one.help)) for one in command.params if one.help and not one.hidden]
         parts += [markdown_table(("", "what it is"), rows)] if rows else []
     return "\n\n".join(parts) + "\n"
 
 
-def _context(command: Any, name: str) -> Any:
-    return command.context_class(command, info_name=name)
+def _words(one: Any) -> str:
+    """Returns how an argument or an option is written."""
+    if one.param_type_name == "argument":
+        return f"`{one.name.upper()}`"
+    value = "" if one.is_flag else f" {one.metavar or one.name.upper()}"
+    return f"`{', '.join([*one.opts, *one.secondary_opts])}{value}`"
 
 
 def _prose(text: str | None) -> str:
@@ -156,8 +161,8 @@ def summary() -> str:
     rows = [(f"`{key}`", unit_of(key) or "–", _plain(_shown(value))) for key, value in _leaves(_example().summary)]
     about = (
         "`summary.json`, `result.summary` and `haploop run --json` hold these entries; the end of a key says its unit. "
-        "The values are those of a run of `all_effects`, 0.6 s long, with a swap. A number that the run did not come to "
-        "is `null`. Books are positive where energy was taken out of the device."
+        "The values are those of a run of `all_effects`, 0.6 s long, with a swap. A number that the run did not "
+        "come to is `null`. Books are positive where energy was taken out of the device."
     )
     return "\n\n".join(["# Summary", GENERATED, about, markdown_table(("key", "unit", "for example"), rows)]) + "\n"
 
@@ -183,16 +188,20 @@ def log() -> str:
         if isinstance(rows, list):
             parts.append("Maps, not columns: `timestamp` (s), `tick`, and the event as it was given.")
             continue
-        parts.append(markdown_table(("column", "unit"), [(f"`{name}`", unit or "–") for name, unit in rows.units.items()]))
+        parts.append(
+            markdown_table(("column", "unit"), [(f"`{name}`", unit or "–") for name, unit in rows.units.items()])
+        )
     return "\n\n".join(parts) + "\n"
 
 
 _LOG = (
-    "A log is [MCAP](https://mcap.dev) with msgpack messages: `/plant` at every plant step (a message a tick, an array of "
-    "its steps; `force` acts from that step on), `/controller` and `/energy` at every tick, `/events` for what changed. "
+    "A log is [MCAP](https://mcap.dev) with msgpack messages: `/plant` at every plant step (a message a tick, an "
+    "array of its steps; `force` acts from that step on), `/controller` and `/energy` at every tick, `/events` for "
+    "what changed. "
     "`haploop.api.read(directory)` gives NumPy arrays by channel and column, `.frame()` a pandas frame; "
     '`run.log = "ticks"` leaves out `/plant`, `"none"` all of it. The columns are those of a run of `all_effects`.'
 )
+
 
 def api() -> str:
     """Returns the page of the Python interface, whose content are docstrings."""

@@ -1,6 +1,6 @@
 """The front door for Python: what the command line does, as functions that return arrays and numbers.
 
-::
+A wall is run, and another one steered while it runs:
 
     from haploop.api import load, run, start
 

@@ -1,0 +1,45 @@
+"""Makes the pictures of README's walk by its own commands: ``python docs/site/pictures.py docs/pictures``."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from PIL import Image
+
+# Pixels across, and colours of a palette: a picture then takes some 60 kB.
+WIDTH, COLOURS = 1000, 64
+NO_SWAP = ("--set", "event=[]")
+# By picture: the commands, {} the directory, and the figure that they leave, whose place the last word of stdout names.
+STEPS = {
+    "demo": [("demo", "--out", "{}")],
+    "buzz": [("run", "demo", *NO_SWAP, "--out", "{}/run"), ("plot", "{}/run")],
+    "damping": [("sweep", "demo_damping", "--out", "{}/sweep"), ("plot", "{}/sweep")],
+    "advice": [("advise", "demo", *NO_SWAP, "--out", "{}/advice", "--json")],
+}
+
+
+def make(name: str, target: Path) -> None:
+    """Runs the commands of a picture and writes it, smaller, into a folder."""
+    with tempfile.TemporaryDirectory() as directory:
+        said = ""
+        for words in STEPS[name]:
+            command = [sys.executable, "-m", "haploop.tools.cli", *(word.format(directory) for word in words)]
+            said = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+        figure = Path(directory, "advice", "figure.png") if name == "advice" else Path(said.split()[-1])
+        shrink(figure, target / f"{name}.png")
+
+
+def shrink(figure: Path, target: Path) -> None:
+    """Writes a picture ``WIDTH`` pixels wide with a palette."""
+    with Image.open(figure) as picture:
+        size = WIDTH, round(picture.height * WIDTH / picture.width)
+        small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS)
+        small.quantize(COLOURS, dither=Image.Dither.NONE).save(target, optimize=True)
+
+
+if __name__ == "__main__":
+    for each in sys.argv[2:] or STEPS:
+        make(each, Path(sys.argv[1]))
