@@ -8,16 +8,16 @@ import pytest
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise import families
-from haploop.tools.advise.families import STABILIZERS, Family
+from haploop.tools.advise.families import STABILIZERS, Family, applies, halton
 from haploop.tools.advise.subject import make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop, ranges
 from haploop.tools.advise.walls.limit import Query
-from haploop.tools.compare.bench import Effort, Job, Row, Trying, along, bench, halton
-from haploop.tools.compare.comparison import AGAIN, TOLD, Comparison, Kept, OfLoop, applies, as_comparison
+from haploop.tools.advise.walls.rendered import Rendered, Trying, rendered
+from haploop.tools.compare.bench import Effort, Job, Row, along, bench
+from haploop.tools.compare.comparison import AGAIN, TOLD, Comparison, Kept, OfLoop, as_comparison
 from haploop.tools.compare.conditions import draw
 from haploop.tools.compare.page import page, sentences
 from haploop.tools.compare.ranking import best, held, ranking
-from haploop.tools.compare.rendered import Rendered, rendered
 from haploop.tools.compare.report import comparison_data, report
 from helpers.scenes.least import KINDS
 from helpers.shown import shown

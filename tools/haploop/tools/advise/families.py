@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,6 +14,8 @@ Values = tuple[float, ...]
 # Parameters of one element, from the most that a loop can bear down, each the one before by this factor; about the best
 # they are narrowed by its square root. Of two together each takes these factors of its best alone.
 _COUNT, FACTOR, _OF_BOTH = 7, 2.0, (1.0, 0.5, 0.25)
+# Bases of the Halton sequence.
+_BASES = (2, 3, 5)
 
 
 @dataclass(frozen=True)
@@ -62,11 +65,15 @@ BIDIRECTIONAL = Family("bidirectional inertia", (("bidirectional-inertia", "mass
 UNIDIRECTIONAL = Family("unidirectional inertia", (("unidirectional-inertia", "mass"),))
 BOTH = Family("damping and unidirectional inertia", DAMPING.parts + UNIDIRECTIONAL.parts)
 SINGLE = (DAMPING, BIDIRECTIONAL, UNIDIRECTIONAL)
-FAMILIES = (NOTHING, *SINGLE, BOTH)
 ADAPTIVE_DAMPING = Family("adaptive damping", (("passivity-controller", "damping"),))
 ADAPTIVE_INERTIA = Family("adaptive inertia", (("adaptive-inertia", "mass"),))
 ADAPTIVE_BOTH = Family("adaptive damping and inertia", (("adaptive-inertia", "damping"), ("adaptive-inertia", "mass")))
 FORCE_BOUNDING = Family("force bounding", (("force-bounding", "share"),), "always")
+COUPLING = Family(
+    "virtual coupling",
+    (("virtual-coupling", "stiffness"), ("virtual-coupling", "damping"), ("virtual-coupling", "mass")),
+    "always",
+)
 # Every stabilizer that comes with haploop, in the order in which tables list them.
 STABILIZERS = (
     NOTHING,
@@ -82,18 +89,20 @@ STABILIZERS = (
     ADAPTIVE_BOTH,
     FORCE_BOUNDING,
     Family("force rate", (("force-rate", "time"),)),
-    Family(
-        "virtual coupling",
-        (("virtual-coupling", "stiffness"), ("virtual-coupling", "damping"), ("virtual-coupling", "mass")),
-        "always",
-    ),
+    COUPLING,
 )
+# Those that render less than the stiffness of their wall, and all that are neither these nor simple ones.
+HIDING = (FORCE_BOUNDING, COUPLING)
+OTHERS = tuple(each for each in STABILIZERS if each not in (NOTHING, *SINGLE, BOTH, ADAPTIVE_BOTH, *HIDING))
 
 
 def first_choices(family: Family, loop: Scene) -> list[Values]:
-    """Returns parameters from about the largest that a loop can bear down: B = m / (T/2 + td), or the moved mass."""
+    """Returns parameters from about the largest that a loop can bear down.
+
+    B = m / (T/2 + td) for damping; the moved mass; four ticks and the delay for the lead of a force.
+    """
     [(_, key)] = family.parts
-    most = _moved_kg(loop) if key == "mass" else _most_damping(loop)
+    most = {"mass": _moved_kg, "damping": _most_damping, "time": _most_time}[key](loop)
     return [(_rounded(most / FACTOR**i),) for i in range(_COUNT)]
 
 
@@ -103,13 +112,12 @@ def box(family: Family, loop: Scene, alone_N_m: float) -> list[tuple[float, floa
     Damping to twice what a loop can bear, B = 2 m / (T/2 + td); inertia to the moved mass; a coupling to 32 times as
     stiff as that wall; a force's lead to four ticks and the delay.
     """
-    period_s = 1.0 / loop.clock.control_rate
     damping, moved = _most_damping(loop), _moved_kg(loop)
     ends = {
         "damping": (damping / 128.0, damping * 2.0),
         "mass": (moved / 1024.0, moved),
         "stiffness": (alone_N_m / 4.0, alone_N_m * 32.0),
-        "time": (period_s / 8.0, 4.0 * period_s + loop.clock.round_trip_delay),
+        "time": (0.125 / loop.clock.control_rate, _most_time(loop)),
         "share": (1.0 / 64.0, 1.0),
     }
     return [ends[key] for _, key in family.parts]
@@ -121,8 +129,17 @@ def _moved_kg(loop: Scene) -> float:
     return loop.device.mass + motor + (0.0 if hand.grip else hand.mass)
 
 
+def _most_time(loop: Scene) -> float:
+    return 4.0 / loop.clock.control_rate + loop.clock.round_trip_delay
+
+
 def _most_damping(loop: Scene) -> float:
     return _moved_kg(loop) / (0.5 / loop.clock.control_rate + loop.clock.round_trip_delay)
+
+
+def applies(family: Family, loop: Scene) -> bool:
+    """Tells whether a family can act: force bounding lets no force pass where the device declares no damping."""
+    return family is not FORCE_BOUNDING or bool(loop.device.damping)
 
 
 def beside(values: Values) -> list[Values]:
@@ -137,6 +154,24 @@ def beside(values: Values) -> list[Values]:
 def together(damping: Values, inertia: Values) -> list[Values]:
     """Returns combinations of what is best alone, which are the largest of each."""
     return [(_rounded(damping[0] * b), _rounded(inertia[0] * m)) for b, m in itertools.product(_OF_BOTH, _OF_BOTH)]
+
+
+def halton(ends: Sequence[tuple[float, float]], count: int) -> list[Values]:
+    """Returns points of the Halton sequence between the ends, evenly on logarithmic axes, to two digits."""
+    points = []
+    for index in range(1, count + 1):
+        unit = [_radical_inverse(index, base) for base in _BASES[: len(ends)]]
+        points.append(tuple(float(f"{low * (high / low) ** u:.2g}") for u, (low, high) in zip(unit, ends, strict=True)))
+    return list(dict.fromkeys(points))
+
+
+def _radical_inverse(index: int, base: int) -> float:
+    found, share = 0.0, 1.0
+    while index:
+        share /= base
+        index, digit = divmod(index, base)
+        found += digit * share
+    return found
 
 
 def _rounded(value: float) -> float:

@@ -23,9 +23,10 @@ _TELLS = 1.2
 _NO_CHANGE = "no single change that was tried gains a fifth"
 _READING = (
     "Every corner: what is uncertain 20 % more or less, what is assumed half or twice, in all combinations, or 32 of "
-    "more; a dash where a simpler element bears as much; * where stiffer walls bear what a softer one does not. "
-    "Changes and assumptions: of the loop as described, with the element advised or with none, whichever bears more. "
-    "All these at holds of 0.3, 1 and 3 times the task's; the first line, at more holds and under attack, may be lower."
+    "more; a dash where a simpler element bears as much; * where stiffer walls bear what a "
+    "softer one does not. Changes and assumptions: of the loop as described, with the element advised or with none, "
+    "whichever bears more. All these at holds of 0.3, 1 and 3 times the task's; the first line, at more holds and "
+    "under attack, may be lower."
 )
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
 # What is assumed, how much that costs, and what to measure.

@@ -11,8 +11,8 @@ from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.families import (
     BOTH,
     DAMPING,
-    FAMILIES,
     NOTHING,
+    OTHERS,
     SINGLE,
     UNIDIRECTIONAL,
     Family,
@@ -21,6 +21,7 @@ from haploop.tools.advise.families import (
     first_choices,
     together,
 )  # fmt: skip
+from haploop.tools.advise.others import Hidden, hiding, worth_more
 from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, Ranges, attack, corner, every_case, ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, Limit, Query, ladder, limits
 from haploop.tools.advise.walls.trial import Failure, Trial, Tried
@@ -35,6 +36,8 @@ _SOFTER = (0.8, 0.62, 0.48, 0.35, 0.25, 0.15, 0.08, 0.03)
 # Parameters that are tried in every corner, by their places among those that bear as much in the loop as described;
 # what suits a device of half the mass is smaller.
 _MANY, _WIDE, _ONE = (0.0, 0.5, 1.0), (-1.0, 0.0, 1.0), (0.5,)
+# Of the other elements every second parameter is tried.
+_EVERY = 2
 # A wall that does not withstand the attack is lowered by this, so often at most.
 _LOWER, _TIMES = 0.97, 60
 # So much stiffer walls have to withstand it, too: where a count lies in the hold is chance, and differs with each.
@@ -70,6 +73,7 @@ class Found:
         as_assumed: the best, and how stiff, were every assumed number right; None where nothing is assumed.
         breaks: the softest wall known not to bear everything, and what it does; None where none was found.
         cases: how many it was tried in, attack included.
+        hidden: elements that render less than their wall, and may hold more than any other.
     """
 
     bests: tuple[Best, ...]
@@ -78,6 +82,7 @@ class Found:
     as_assumed: Best | None
     breaks: tuple[float, Failure] | None
     cases: int
+    hidden: tuple[Hidden, ...] = ()
 
 
 def search(
@@ -101,10 +106,18 @@ def search(
     stage("two elements")
     pairs = together(_equals(known, DAMPING)[-1], _equals(known, UNIDIRECTIONAL)[-1])
     known |= nominal([(BOTH, values) for values in pairs], rungs)
+    stage("every other element")
+    sparse = {family: first_choices(family, loop)[::_EVERY] for family in OTHERS}
+    known |= nominal([(family, values) for family in OTHERS for values in sparse[family]], rungs)
+    good = worth_more(known, WORTH)
+    more = [(family, values) for family in good for values in beside(_equals(known, family)[0])]
+    known |= nominal([choice for choice in more if choice not in known], rungs)
+    hidden = hiding(loop, trial, alone, WORTH * max(limit.stiffness_N_m for limit in known.values()))
+    some = (NOTHING, *SINGLE, BOTH, *good)
     stage("every corner")
     of, measured = ranges(loop, assumed), ranges(loop)
-    bests = _in_corners(loop, trial, known, of, _MANY if of == measured else _WIDE)
-    as_assumed = None if of == measured else _advised(_in_corners(loop, trial, known, measured, _ONE))
+    bests = _in_corners(loop, trial, known, of, _MANY if of == measured else _WIDE, some)
+    as_assumed = None if of == measured else _advised(_in_corners(loop, trial, known, measured, _ONE, some))
     best = _advised(bests)
     values, safe = _refined(loop, trial, best, of)
     described = known.get((best.family, values)) or nominal([(best.family, values)], rungs)[best.family, values]
@@ -114,8 +127,11 @@ def search(
     stage("the attack")
     stiffness, broken = _attacked(loop, trial, advised, top, of)
     cases = len(_BEYOND) * len(attack(of)) + len(every_case(of))
-    shown = tuple(advised if each is best else each for each in bests)
-    return Found(shown, advised, stiffness, as_assumed, broken, cases)
+    shown = [advised if each is best else each for each in bests]
+    for family in (each for each in OTHERS if each not in good):
+        values = _equals(known, family)[0]
+        shown.append(Best(family, values, known[family, values]))
+    return Found(tuple(shown), advised, stiffness, as_assumed, broken, cases, hidden)
 
 
 def _equals(known: dict[Choice, Limit], family: Family) -> list[Values]:
@@ -135,16 +151,21 @@ def _is_half(some: Values, of: Values) -> bool:
 
 
 def _in_corners(
-    loop: Scene, trial: Trial, known: dict[Choice, Limit], of: Ranges, places: Sequence[float]
+    loop: Scene,
+    trial: Trial,
+    known: dict[Choice, Limit],
+    of: Ranges,
+    places: Sequence[float],
+    families: Sequence[Family],
 ) -> list[Best]:
-    """Returns the best of each family; those worth it with their limit in every corner, at the holds tried first.
+    """Returns the best of some families; those worth it with their limit in every corner, at the holds tried first.
 
     Of parameters that bear as much in the loop as described those at these places, from the smallest, 0, to the
     largest, 1; below 0 the next that are half of the smallest or less.
     """
     bests: list[Best] = []
     candidates: list[Choice] = []
-    for family in FAMILIES:
+    for family in families:
         equals = _equals(known, family)
         bests.append(Best(family, equals[0], known[family, equals[0]]))
         if not family.parts or bests[-1].nominal.stiffness_N_m > WORTH * bests[0].nominal.stiffness_N_m:

@@ -4,36 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.changes import scaled
-from haploop.tools.advise.families import STABILIZERS, Family, Values, box
+from haploop.tools.advise.families import STABILIZERS, Family, Values, box, halton
 from haploop.tools.advise.report import describe
 from haploop.tools.advise.walls.cases import ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, MOST_N_M, Query, ladder, limits
-from haploop.tools.advise.walls.trial import Failure, Store, Trial
+from haploop.tools.advise.walls.rendered import Trying, tried
+from haploop.tools.advise.walls.trial import Store, Trial
 from haploop.tools.compare.conditions import draw
-from haploop.tools.compare.rendered import Rendered, rendered
 
 # How closely limits are found while parameters are compared, and then.
-_ROUGH, CLOSE = 0.15, 0.06
+_ROUGH, CLOSE = 0.25, 0.08
 # Rungs of the tuning, as multiples of the wall without any element: softer walls have to bear everything, too.
-_RUNGS = (0.3, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0)
+_RUNGS = (0.3, 0.8, 1.0, 1.25, 1.55, 1.95, 2.5, 4.0, 7.0)
 # Rungs of a trial, as multiples of the limit in the tuning.
-_ABOUT = (0.15, 0.45, 0.7, 0.85, 1.0, 1.2, 1.5)
-# Bases of the Halton sequence, and the shares of a box's logarithmic axes that are searched through the best.
-_BASES, _ALONG = (2, 3, 5), (0.8, 0.2)
-# A wall of which less than this share is rendered is hidden by its element: softer ones are measured, too.
-_HIDDEN, _HALVINGS = 0.5, 16
+_ABOUT = (0.15, 0.5, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.5)
+# The share of a box's logarithmic axes that is searched through the best.
+_ALONG = 0.6
 # What is 20 % off, together, to tell how sensitive the wall is to the device.
 _DEVICE = ("device.mass", "device.damping", "friction.kinetic", "transmission.stiffness")
 OFF = (0.8, 1.2)
 
 Ends = tuple[float, float]
 Choice = tuple[int, Values]
-Tune = Callable[[Sequence[Choice]], dict[Choice, "Trying"]]
+Tune = Callable[[Sequence[Choice]], dict[Choice, Trying]]
 
 
 @dataclass(frozen=True)
@@ -41,15 +38,15 @@ class Effort:
     """How much is spent on every stabilizer alike.
 
     Attributes:
-        points: parameters tried in the whole box, then along its axes through the best, then closer to it.
+        points: parameters tried in the whole box, and as many along its axes through the best.
         cases: of the tuning.
         seeds: each draws ``of_seed`` cases.
     """
 
-    points: int = 6
-    cases: int = 5
-    seeds: int = 8
-    of_seed: int = 4
+    points: int = 7
+    cases: int = 4
+    seeds: int = 6
+    of_seed: int = 3
 
 
 @dataclass(frozen=True)
@@ -59,7 +56,7 @@ class Job:
     Attributes:
         alone_N_m: about the stiffest wall without any.
         blocks: the seeds that it is tuned and tried by, each for itself; blocks share none.
-        sensitive: whether its sensitivity is measured.
+        sensitive: whether its sensitivity is measured, by the first block.
     """
 
     loop: Scene
@@ -68,21 +65,6 @@ class Job:
     blocks: tuple[int, ...]
     effort: Effort
     sensitive: bool = True
-
-
-class Trying(NamedTuple):
-    """The wall of which most is rendered, of those that bear everything.
-
-    Attributes:
-        limit_N_m: the stiffest that does; 0 where none does.
-        wall_N_m: the one measured, the same but where the element hides it.
-    """
-
-    limit_N_m: float
-    wall_N_m: float
-    rendered: Rendered
-    fails_N_m: float
-    failure: Failure | None
 
 
 @dataclass(frozen=True)
@@ -137,13 +119,16 @@ def bench(job: Job) -> tuple[Row, ...]:
             rungs = tuple(times * (near.limit_N_m or job.alone_N_m / 3.0) for times in _ABOUT)
             drawn = [draw(of, block, seed, effort.of_seed) for seed in range(1, effort.seeds + 1)]
             queries += [Query(loop, elements, cases, rungs) for cases in drawn]
-            if job.sensitive:
+            if job.sensitive and block == blocks[0]:
                 off = [family.elements(_times(values, ends, factor)) for factor in OFF] if values else []
                 queries += [Query(loop, some, tuning[block], rungs) for some in (elements, *off)]
                 queries += [Query(_device(loop, factor), elements, tuning[block], rungs) for factor in OFF]
         found = tried(trial, queries, CLOSE)
-    each = len(found) // len(blocks)
-    parts = [found[place : place + each] for place in range(0, len(found), each)]
+    later = (len(blocks) - 1) * effort.seeds
+    parts = [
+        found[: len(found) - later],
+        *(found[at : at + effort.seeds] for at in range(len(found) - later, len(found), effort.seeds)),
+    ]
     return tuple(
         _row(family, block, best[block][0], ends, part, effort.seeds) for block, part in zip(blocks, parts, strict=True)
     )
@@ -166,25 +151,8 @@ def _row(family: Family, block: int, values: Values, ends: Sequence[Ends], found
     )
 
 
-def tried(trial: Trial, queries: Sequence[Query], tolerance: float) -> list[Trying]:
-    """Finds the limit of each query, and measures what is rendered there; of a hidden wall, softer ones, too."""
-    found = limits(trial, queries, tolerance)
-    best = [(limit.stiffness_N_m, each) for limit, each in zip(
-        found, rendered(queries, [limit.stiffness_N_m for limit in found]), strict=True)]  # fmt: skip
-    hidden = [place for place, (wall_N_m, each) in enumerate(best) if each.held_N_m < _HIDDEN * wall_N_m]
-    softer = [(place, best[place][0] * 0.5**times) for place in hidden for times in range(1, _HALVINGS + 1)]
-    shown = rendered([queries[place] for place, _ in softer], [wall_N_m for _, wall_N_m in softer])
-    for (place, wall_N_m), each in zip(softer, shown, strict=True):
-        if each.held_N_m > best[place][1].held_N_m:
-            best[place] = wall_N_m, each
-    return [
-        Trying(limit.stiffness_N_m, *each, limit.fails_N_m, limit.failure)
-        for limit, each in zip(found, best, strict=True)
-    ]
-
-
 def _tuned(tune: Tune, ends: Sequence[Ends], count: int, blocks: Sequence[int]) -> dict[int, tuple[Values, Trying]]:
-    """Returns what renders most in each block: of some over the whole box, then of as many along its axes, twice.
+    """Returns what renders most in each block: of some over the whole box, then of as many along its axes.
 
     The first has the smallest of all parameters, which are about none.
     """
@@ -195,8 +163,8 @@ def _tuned(tune: Tune, ends: Sequence[Ends], count: int, blocks: Sequence[int]) 
         of_block = {values: each for (of, values), each in known.items() if of == block}
         return max(of_block.items(), key=lambda each: each[1].rendered.held_N_m)
 
-    for share in _ALONG if ends else ():
-        more = [(block, values) for block in blocks for values in along(best(block)[0], ends, share, count)]
+    if ends:
+        more = [(block, values) for block in blocks for values in along(best(block)[0], ends, _ALONG, count)]
         known |= tune([choice for choice in more if choice not in known])
     return {block: best(block) for block in blocks}
 
@@ -211,24 +179,6 @@ def along(best: Values, ends: Sequence[Ends], share: float, count: int) -> list[
             moved = float(f"{left * (right / left) ** ((place + 0.5) / count):.2g}")
             points.append((*best[:axis], moved, *best[axis + 1 :]))
     return list(dict.fromkeys(points))
-
-
-def halton(ends: Sequence[Ends], count: int) -> list[Values]:
-    """Returns points of the Halton sequence between the ends, evenly on logarithmic axes, to two digits."""
-    points = []
-    for index in range(1, count + 1):
-        unit = [_radical_inverse(index, base) for base in _BASES[: len(ends)]]
-        points.append(tuple(float(f"{low * (high / low) ** u:.2g}") for u, (low, high) in zip(unit, ends, strict=True)))
-    return list(dict.fromkeys(points))
-
-
-def _radical_inverse(index: int, base: int) -> float:
-    found, share = 0.0, 1.0
-    while index:
-        share /= base
-        index, digit = divmod(index, base)
-        found += digit * share
-    return found
 
 
 def _times(values: Values, ends: Sequence[Ends], factor: float) -> Values:

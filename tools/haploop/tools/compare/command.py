@@ -61,10 +61,10 @@ def compare(
 def _compare(subject: Subject, grid: bool, workers: int | None, out: Path | None, as_json: bool) -> None:
     from haploop.launch.spec import make_output
     from haploop.logger.summary import finite
-    from haploop.tools.advise.families import FORCE_BOUNDING
+    from haploop.tools.advise.families import FORCE_BOUNDING, applies
     from haploop.tools.advise.walls.cases import make_loop
     from haploop.tools.compare.bench import Effort
-    from haploop.tools.compare.comparison import DESCRIBED, Comparison, Kept, applies, compare, variants
+    from haploop.tools.compare.comparison import DESCRIBED, Comparison, Kept, compare, variants
     from haploop.tools.compare.conditions import task_words
     from haploop.tools.compare.figure import draw
     from haploop.tools.compare.report import comparison_data, report

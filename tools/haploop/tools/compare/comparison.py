@@ -15,10 +15,10 @@ from typing import Any
 
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Actuator, Scene
-from haploop.tools.advise.families import FORCE_BOUNDING, STABILIZERS, Family
+from haploop.tools.advise.families import STABILIZERS, applies
+from haploop.tools.advise.walls.rendered import Rendered, Trying
 from haploop.tools.advise.walls.trial import Failure
-from haploop.tools.compare.bench import Effort, Job, Row, Trying, alone, bench
-from haploop.tools.compare.rendered import Rendered
+from haploop.tools.compare.bench import Effort, Job, Row, alone, bench
 from haploop.tools.executor.executors import Executor
 from haploop.tools.render.progress import Stage
 
@@ -76,11 +76,6 @@ def variants(loop: Scene) -> dict[str, Scene]:
         slow = replace(loop, actuator=replace(actuator, bandwidth=_DRIVE_HZ))
         found[f"drive of {_DRIVE_HZ:g} Hz"] = slow
     return found
-
-
-def applies(family: Family, loop: Scene) -> bool:
-    """Tells whether a family can act: force bounding lets no force pass where the device declares no damping."""
-    return family is not FORCE_BOUNDING or bool(loop.device.damping)
 
 
 class Kept:

@@ -50,7 +50,7 @@ def report(told: Comparison) -> RenderableType:
 def task_sentence(told: Comparison) -> str:
     effort = told.effort
     return (
-        f"Tried by {told.task}: {effort.cases} such conditions tune {3 * effort.points + 1} sets of parameters each, "
+        f"Tried by {told.task}: {effort.cases} such conditions tune {2 * effort.points + 1} sets of parameters each, "
         f"{effort.seeds} seeds of {effort.of_seed} others try the best one."
     )
 

@@ -11,10 +11,13 @@ import numpy as np
 from haploop.protocol.scene.scene import Clock, Wall
 from haploop.tools.advise.walls.cases import LASTS_S, slowness
 from haploop.tools.advise.walls.felt import buzz, felt_m
-from haploop.tools.advise.walls.limit import Query
+from haploop.tools.advise.walls.limit import Query, limits
 from haploop.tools.advise.walls.loops import Seen, make_loops
-from haploop.tools.advise.walls.trial import FROM_S, STRETCH_S
+from haploop.tools.advise.walls.trial import FROM_S, STRETCH_S, Failure, Trial
 from haploop.tools.linear.linearity import installed_kinds
+
+# A wall of which less than this share is rendered is hidden by its element: softer ones are measured, too.
+_HIDDEN, _HALVINGS = 0.5, 16
 
 
 class Rendered(NamedTuple):
@@ -32,6 +35,21 @@ class Rendered(NamedTuple):
     ripple_N: float = 0.0
     extra_N: float = 0.0
     extra_rms_N: float = 0.0
+
+
+class Trying(NamedTuple):
+    """The wall of which most is rendered, of those that bear everything.
+
+    Attributes:
+        limit_N_m: the stiffest that does; 0 where none does.
+        wall_N_m: the one measured, the same but where the element hides it.
+    """
+
+    limit_N_m: float
+    wall_N_m: float
+    rendered: Rendered
+    fails_N_m: float
+    failure: Failure | None
 
 
 def rendered(queries: Sequence[Query], stiffnesses_N_m: Sequence[float]) -> list[Rendered]:
@@ -53,6 +71,23 @@ def rendered(queries: Sequence[Query], stiffnesses_N_m: Sequence[float]) -> list
         for place, row in zip(group, _measure(seen, stiffness, scene.clock), strict=True):
             rows[members[place][0]].append(row)
     return [Rendered(*np.mean(row, axis=0).tolist()) if row else Rendered() for row in rows]
+
+
+def tried(trial: Trial, queries: Sequence[Query], tolerance: float) -> list[Trying]:
+    """Finds the limit of each query, and measures what is rendered there; of a hidden wall, softer ones, too."""
+    found = limits(trial, queries, tolerance)
+    best = [(limit.stiffness_N_m, each) for limit, each in zip(
+        found, rendered(queries, [limit.stiffness_N_m for limit in found]), strict=True)]  # fmt: skip
+    hidden = [place for place, (wall_N_m, each) in enumerate(best) if each.held_N_m < _HIDDEN * wall_N_m]
+    softer = [(place, best[place][0] * 0.5**times) for place in hidden for times in range(1, _HALVINGS + 1)]
+    shown = rendered([queries[place] for place, _ in softer], [wall_N_m for _, wall_N_m in softer])
+    for (place, wall_N_m), each in zip(softer, shown, strict=True):
+        if each.held_N_m > best[place][1].held_N_m:
+            best[place] = wall_N_m, each
+    return [
+        Trying(limit.stiffness_N_m, *each, limit.fails_N_m, limit.failure)
+        for limit, each in zip(found, best, strict=True)
+    ]
 
 
 def _measure(seen: Seen, stiffness_N_m: np.ndarray, clock: Clock) -> list[Rendered]:
