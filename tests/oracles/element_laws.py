@@ -82,6 +82,19 @@ def observed(most: float, *, reference: float = 0.0, reset: bool = False, inerti
         p, inside, spring = yield answer
 
 
+def resisting(damping: float = 0.0, mass: float = 0.0, *, one_way: bool = False, period: float) -> Law:
+    """Damping and inertia; one way: damping on the way in alone, inertia while speed and last change agree in sign."""
+    p, _, _ = yield 0.0
+    before, rate_before, change_before = p, 0.0, 0.0
+    while True:
+        rate = (p - before) / period
+        change = (rate - rate_before) / period
+        push = 0.0 if one_way and rate <= 0.0 else damping * rate
+        push += 0.0 if one_way and rate * change_before < 0.0 else mass * change
+        before, rate_before, change_before = p, rate, change
+        p, _, _ = yield push
+
+
 def bounded(damping: float, *, period: float) -> Law:
     """Force bounding: the push may be no more than the damping of the device can answer for."""
     energy, push, before = 0.0, 0.0, None

@@ -1,4 +1,4 @@
-"""Stabilizers of the field on taps against 2000 N/m, beside programs of each law, and what each law promises."""
+"""Every element on taps against 2000 N/m, beside a program of its law."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 
+from haploop.controller.dissipation import registry
 from helpers.runs.batches import alone
 from helpers.scenes.least import scene
-from oracles.element_laws import Law, Tap, bounded, coupled, leading, observed, tap
+from oracles.element_laws import Law, Tap, bounded, coupled, leading, observed, resisting, tap
 
 T, MASS, SPEED, HEIGHT, STIFFNESS, TICKS = 1e-3, 0.05, 0.2, 0.0101, 2000.0, 120
 
@@ -24,6 +25,10 @@ def law_of(kind: str) -> tuple[dict[str, float], Law]:
             return {"damping": 12.0}, observed(12.0, reference=STIFFNESS, period=T)
         case "adaptive-inertia":
             return {"damping": 0.5, "mass": 0.004}, observed(0.5, inertia=0.004, period=T)
+        case "damping" | "unidirectional-damping":
+            return {"damping": 2.5}, resisting(2.5, one_way=kind != "damping", period=T)
+        case "bidirectional-inertia" | "unidirectional-inertia":
+            return {"mass": 0.007}, resisting(mass=0.007, one_way=kind[0] == "u", period=T)
         case "force-bounding":
             return {"share": 0.8}, bounded(0.8 * 0.2, period=T)
         case "force-rate":
@@ -35,6 +40,10 @@ def law_of(kind: str) -> tuple[dict[str, float], Law]:
 
 
 KINDS = [
+    "damping",
+    "unidirectional-damping",
+    "bidirectional-inertia",
+    "unidirectional-inertia",
     "passivity-controller",
     "passivity-controller-reset",
     "passivity-controller-reference",
@@ -51,7 +60,8 @@ def both(kind: str, late: int) -> tuple[dict[str, Any], Tap]:
     values, law = law_of(kind)
     name = kind.partition(" ")[0]
     acts = "always" if name in ("force-rate", "virtual-coupling") else "in-contact"
-    damping = 0.2 if kind == "force-bounding" else 0.0
+    # Without damping the sign of the acceleration in free flight is that of rounding, which the inertia would heed.
+    damping = 0.2 if kind in ("force-bounding", "unidirectional-inertia") else 0.0
     made = scene(
         duration=TICKS * T,
         clock={"round_trip_delay": late * T},
@@ -61,6 +71,10 @@ def both(kind: str, late: int) -> tuple[dict[str, Any], Tap]:
     )
     fall = {"mass": MASS, "damping": damping, "stiffness": STIFFNESS, "height": HEIGHT, "speed": SPEED}
     return alone(made), tap(law, **fall, period=T, ticks=TICKS, late=late, always=acts == "always")
+
+
+def test_no_element_of_the_package_is_left_out() -> None:
+    assert {kind.partition(" ")[0] for kind in KINDS} == registry().keys()
 
 
 @pytest.mark.parametrize("late", [0, 1])

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from haploop.protocol.scene.hand_force import Sine, Trace
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene, Wall, accelerometer_is_used, hand_is_unmodelled
+from haploop.protocol.walls.registry import make_wall
 
 # Beyond these a number is in order, but more often a slip of the unit: key, least, most, unit.
 _USUAL = (
@@ -93,7 +94,7 @@ def _begins_deep(scene: Scene) -> Found | None:
     depth_m = _start_depth_m(scene)
     if scene.wall is None or depth_m <= _DEEP_M or not scene.wall.stiffness:
         return None
-    return {"depth_mm": depth_m * 1e3, "force_N": scene.wall.stiffness * depth_m}
+    return {"depth_mm": depth_m * 1e3, "force_N": make_wall(scene.wall).held(depth_m)}
 
 
 RULES = (
