@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 import zmq
 
+from haploop.launch.processes import run_directory
 from haploop.launch.processes.run_directory import Elsewhere, RunNotFound, find
+from haploop.protocol.transport import clock_client
 from haploop.protocol.transport.clock_client import ClockClient, Refused
 from haploop.protocol.transport.keys import CLIENT, CLOCK, make_keys, read_keys
 from haploop.protocol.transport.sockets import SecureContext, Transport, connect, open_socket
@@ -58,6 +60,22 @@ def test_a_key_that_the_run_does_not_know_is_told_so(keys, tmp_path):
 
 
 def test_whoever_comes_without_keys_is_told_that_the_run_has_some(keys):
+    with listening(keys) as address:
+        assert "is guarded by keys" in why(address, None)
+
+
+def test_whoever_is_turned_away_before_a_first_word_can_be_said_is_told_why_and_does_not_wait_for_ever(
+    keys, monkeypatch
+):
+    """A socket that has come to another's keys is connected to nothing from then on."""
+
+    def connect_and_be_turned_away(socket, address):
+        connect(socket, address)
+        while socket.getsockopt(zmq.EVENTS) & zmq.POLLOUT:
+            socket.poll(10, zmq.POLLIN)
+
+    for module in (run_directory, clock_client):
+        monkeypatch.setattr(module, "connect", connect_and_be_turned_away)
     with listening(keys) as address:
         assert "is guarded by keys" in why(address, None)
 

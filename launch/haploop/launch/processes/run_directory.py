@@ -21,7 +21,7 @@ from haploop.launch.processes.private_directory import (
 from haploop.launch.spec import OutputError
 from haploop.protocol.transport.connection import Connection
 from haploop.protocol.transport.keys import CLIENT, KeysError, read_keys
-from haploop.protocol.transport.sockets import SecureContext, Transport, connect, open_socket
+from haploop.protocol.transport.sockets import SecureContext, Transport, connect, open_socket, send_at_once
 from haploop.protocol.transport.wire import Message, WireError, decode, encode
 
 # A swap may try a plugin first.
@@ -153,7 +153,7 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
     connection = Connection(context, socket, run.clock) if is_tcp else None
     try:
         connect(socket, run.clock)
-        socket.send(encode("COMMAND", verb, arguments))
+        send_at_once(socket, encode("COMMAND", verb, arguments))  # where it cannot, the connection tells why
         answer_ms = _SWAP_MS if verb == "swap" else _ANSWER_MS
         for _ in range(answer_ms // _LOOK_MS):
             if socket.poll(_LOOK_MS):

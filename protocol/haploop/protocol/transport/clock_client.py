@@ -15,6 +15,7 @@ from haploop.protocol.transport.sockets import (
     connect,
     has_message,
     open_socket,
+    send_at_once,
     transport_of,
     with_host_of,
 )
@@ -80,7 +81,7 @@ class ClockClient:
 
             mine = own_address_towards(self._address)
             endpoints = {channel: with_host_of(address, mine) for channel, address in endpoints.items()}
-        self.socket.send(encode("JOIN", self.role, self._secret, os.getpid(), endpoints, lossless, _PROGRAM))
+        self._say("JOIN", self.role, self._secret, os.getpid(), endpoints, lossless, _PROGRAM)
         for _ in range(int(_JOIN_S * 1000 / _LOOK_MS)):
             if not self.socket.poll(_LOOK_MS):
                 if self._connection and (why := self._connection.trouble()):
@@ -98,6 +99,12 @@ class ClockClient:
             if frame and frame.name == "REFUSED":
                 raise Refused(frame.fields[0])
         raise Refused(f"The clock did not answer within {_JOIN_S:g} s; is the run still there?")
+
+    def _say(self, name: str, *fields: Any) -> None:
+        """Sends a message, once there is room; where the connection does not stand, it is lost, and others tell why."""
+        frame = encode(name, *fields)
+        if not send_at_once(self.socket, frame) and not (self._connection and self._connection.is_down()):
+            self.socket.send(frame)
 
     def poll(self) -> None:
         """Takes what the clock has sent, without waiting; raises Aborted where its host can no longer be reached."""
@@ -139,23 +146,23 @@ class ClockClient:
 
     def ready(self, tick: int) -> None:
         """Reports that all connections stand and that work starts at ``tick``."""
-        self.socket.send(encode("READY", tick))
+        self._say("READY", tick)
 
     def progress(self, tick: int, status: Message | None = None) -> None:
         """Reports that every tick before ``tick`` is done."""
-        self.socket.send(encode("PROGRESS", tick, status or {}))
+        self._say("PROGRESS", tick, status or {})
 
     def waiting(self, tick: int, on: str) -> None:
         """Reports that this node is alive and waits for the process ``on``."""
-        self.socket.send(encode("WAITING", tick, on))
+        self._say("WAITING", tick, on)
 
     def ended(self, tick: int, reason: str) -> None:
         """Reports that the plant ended the run by itself."""
-        self.socket.send(encode("ENDED", tick, reason))
+        self._say("ENDED", tick, reason)
 
     def leave(self, name: str, *fields: Any) -> None:
         """Sends DONE, FAILED or LEAVE, allows it 1 s to go out, and closes."""
-        self.socket.send(encode(name, *fields))
+        self._say(name, *fields)
         self.close(linger_ms=1000)
 
     def close(self, linger_ms: int = 0) -> None:

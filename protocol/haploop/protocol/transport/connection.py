@@ -62,6 +62,11 @@ class Connection:
             return ""
         return self._why.format(self._address.removeprefix("tcp://"))
 
+    def is_down(self) -> bool:
+        """Tells whether the connection does not stand."""
+        self._take()
+        return not self._stands
+
     def lost_s(self) -> float:
         """Returns how long a connection that stood has been gone, s; 0 while it stands, or never has."""
         self._take()

@@ -173,6 +173,18 @@ def bare_send(socket: zmq.Socket[bytes]) -> Callable[..., Any]:
     return super(zmq.Socket, socket).send if isinstance(socket, zmq.Socket) else socket.send
 
 
+def send_at_once(socket: zmq.Socket[bytes], frame: bytes) -> bool:
+    """Sends a frame if that can be done at once; tells whether it could.
+
+    A socket that has connected to another's keys is soon connected to nothing, and a send would wait for ever.
+    """
+    try:
+        socket.send(frame, zmq.DONTWAIT)
+    except zmq.Again:
+        return False
+    return True
+
+
 def transport_of(context: zmq.Context[zmq.Socket[bytes]]) -> Transport:
     return context.transport if isinstance(context, SecureContext) else Transport()
 
