@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from haploop.logger.summary import Summary
 from haploop.protocol.changes import describe
 from haploop.tools.figure import style
 from haploop.tools.figure.data import TOGETHER, Book, RunData
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
 from haploop.tools.figure.own_columns import draw_own_columns, own_columns
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
-from haploop.tools.render.report import HELD, LAW_TAKES, count_losses, leak_causes, plant_books, swing_words
+from haploop.tools.render.report import HELD, count_losses, leak_rows, plant_books, swing_words
 from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount, parameters, spring
 
@@ -150,23 +149,13 @@ def book_rows(run: RunData, books: list[Book]) -> list[Row]:
         true, sampled = (amount(value, "J") for value in book.ends_J)
         rows.append(Row(name, true, sampled, at_work, book.name))
         if book.name == "wall":
-            rows += _leak_rows(energy.get("wall", {}))
+            leaks = leak_rows(energy.get("wall", {})).items()
+            rows += [Row(f"    {words}", amount(value, "J")) for words, value in leaks if words != HELD or value]
     if len(shown) > _MOST_BOOKS:
         rows.append(Row(f"and {len(shown) - _MOST_BOOKS} more elements in summary.json", ""))
     for key, words in plant_books(energy).items():
         rows.append(Row(words, amount(energy[key], "J"), book=_LINES.get(key, "")))
     return rows + [Row(words, f"{count}") for words, count in count_losses(run.summary).items()]
-
-
-def _leak_rows(wall: Summary) -> list[Row]:
-    if "leak" not in wall:
-        return []
-    rows = [Row(f"    leak by {words}", amount(wall["leak"][key], "J")) for key, words in leak_causes(wall).items()]
-    ideal = wall["ideal_J"] or 0.0
-    held = abs(ideal) > 1e-9 * abs(wall["true_J"] or 0.0)
-    if "dissipated_J" in wall:
-        rows.append(Row(f"    {LAW_TAKES}", amount(wall["dissipated_J"], "J")))
-    return rows + ([Row(f"    {HELD}", amount(ideal, "J"))] if held else [])
 
 
 def event_lines(run: RunData) -> list[str]:

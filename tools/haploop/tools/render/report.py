@@ -115,9 +115,17 @@ def _lateness(of: Summary) -> list[tuple[str, str]]:
     return [("ticks late by", f"{words}; {many}{lost}")]
 
 
-def leak_causes(wall: Summary) -> dict[str, str]:
-    """Returns the entries of a wall's ``leak`` in a summary, in words."""
-    return LEAK_CAUSES | (_OF_DAMPING if "dissipated_J" in wall else {})
+def leak_rows(wall: Summary) -> dict[str, float | None]:
+    """Returns the leak of a summary's wall by cause, and what it takes and holds, J; nothing for one without a leak."""
+    if "leak" not in wall:
+        return {}
+    causes = LEAK_CAUSES | (_OF_DAMPING if "dissipated_J" in wall else {})
+    rows = {f"leak by {words}": wall["leak"][key] for key, words in causes.items()}
+    rows |= {LAW_TAKES: wall["dissipated_J"]} if "dissipated_J" in wall else {}
+    # The rounding error of a much larger number is zero.
+    ideal_J, true_J = wall["ideal_J"], wall["true_J"]
+    is_zero = None not in (ideal_J, true_J) and abs(ideal_J) <= 1e-9 * abs(true_J)
+    return rows | {HELD: 0.0 if is_zero else ideal_J}
 
 
 def _books(energy: Summary, control_rate: float) -> Table:
@@ -126,14 +134,8 @@ def _books(energy: Summary, control_rate: float) -> Table:
     wall = energy["wall"]
     if "leak" in wall:
         table.add_row("wall", "", amount(wall["true_J"], "J"), amount(wall["sampled_J"], "J"))
-        for key, words in leak_causes(wall).items():
-            table.add_row(f"  leak by {words}", "", amount(wall["leak"][key], "J"), "")
-        # The rounding error of a much larger number is zero.
-        ideal_J, true_J = wall["ideal_J"], wall["true_J"]
-        is_zero = None not in (ideal_J, true_J) and abs(ideal_J) < 1e-9 * abs(true_J)
-        if "dissipated_J" in wall:
-            table.add_row(f"  {LAW_TAKES}", "", amount(wall["dissipated_J"], "J"), "")
-        table.add_row(f"  {HELD}", "", amount(0.0 if is_zero else ideal_J, "J"), "")
+        for words, value_J in leak_rows(wall).items():
+            table.add_row(f"  {words}", "", amount(value_J, "J"), "")
     for element in energy["elements"]:
         values = parameters(element["parameters"])
         ticks = f"{element['from_tick'] / control_rate:g}–{element['to_tick'] / control_rate:g} s"
