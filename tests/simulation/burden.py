@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from simulation.world import Process
+    from simulation.computer.world import Process
 
 # Calls that one command may take, some 50 ms of work; the first mistake of all loads what tells it, in 28 000.
 MOST_CALLS = 60_000

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from simulation.play import Sim
+    from simulation.sim import Sim
 
 OWN = ("plant", "controller", "logger")
 ALL = (*OWN, "launcher")

@@ -12,10 +12,10 @@ import pytest
 import zmq
 
 from haploop.protocol.transport.sockets import has_message, open_socket
-from simulation.machine import Disk, SimMachine
-from simulation.sockets import SimContext
+from simulation.computer.machine import Disk, SimMachine
+from simulation.computer.sockets import SimContext
+from simulation.computer.world import Process, World
 from simulation.watch import Watch
-from simulation.world import Process, World
 
 Conversation = Callable[[Any, str, Callable[[], None]], list[Any]]
 

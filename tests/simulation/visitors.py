@@ -22,11 +22,11 @@ from haploop.protocol.transport.observer import Observer
 from haploop.protocol.transport.wire import encode
 from haploop.view.receive.run_session import RunSession
 from helpers.live.attacks import false_joins, junk, out_of_place
+from simulation.computer.world import Process
 from simulation.faults import Fault
-from simulation.world import Process
 
 if TYPE_CHECKING:
-    from simulation.play import Sim
+    from simulation.sim import Sim
 
 _LOOK_S = 0.2
 _NO_PID = 2**22 + 1

@@ -13,12 +13,12 @@ from haploop.protocol.changes import Event
 from haploop.protocol.transport.messages import BY_CODE, VERSION
 from haploop.protocol.transport.wire import decode
 from simulation.burden import MOST_CALLS, Holdings, Work
-from simulation.world import Process
+from simulation.computer.world import Process
 
 if TYPE_CHECKING:
-    from simulation.machine import SimRun
-    from simulation.network import Frames, Pipe
-    from simulation.sockets import SimSocket
+    from simulation.computer.machine import SimRun
+    from simulation.computer.network import Frames, Pipe
+    from simulation.computer.sockets import SimSocket
 
 _TURNS = ("JOIN", "READY", "ENDED", "DONE", "FAILED")
 _BLOCKS = ("PLANT_BLOCK", "CONTROLLER_BLOCK", "ENERGY_BLOCK")

@@ -12,7 +12,7 @@ from typing import Any
 
 import zmq
 
-from simulation.world import World
+from simulation.computer.world import World
 
 Frames = list[bytes]
 

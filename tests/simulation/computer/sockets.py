@@ -9,8 +9,8 @@ from typing import Any
 
 import zmq
 
-from simulation.network import Frames, Lane, Pipe
-from simulation.world import Process, World
+from simulation.computer.network import Frames, Lane, Pipe
+from simulation.computer.world import Process, World
 
 
 class SimSocket:

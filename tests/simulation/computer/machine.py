@@ -13,8 +13,8 @@ from typing import Any
 
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.node import take_part
-from simulation.sockets import SimContext, SimPoller
-from simulation.world import Process, World
+from simulation.computer.sockets import SimContext, SimPoller
+from simulation.computer.world import Process, World
 
 
 @dataclass
