@@ -55,6 +55,8 @@ def deep(levels: int) -> dict[str, Any]:
         ("swap", {"swap": None}, "exactly one of swap, set"),
         ("swap", {"swap": {"kind": ["damping"]}}, "damping"),
         ("stop", {"self": 1}, "The arguments of stop cannot be used: it takes none."),
+        ("set", {"set": {1: 2}}, "The keys of what a command carries are texts, but 1 was given as one."),
+        ("swap", {"swap": {"kind": "damping", None: 2}}, "are texts, but None was given"),
         ("swap", {"surprise": 1}, "it takes swap, element, at, reload, and swap must be given."),
         ("pace", {"pace": 1e305}, "from 1e-06 to 1e+06, or free, but 1e+305"),
         ("pace", {"pace": float("inf")}, "or free, but inf"),

@@ -31,6 +31,7 @@ from simulation.faults import (
     Stop,
     When,
 )
+from simulation.plugins import BROKEN, SOUND, Reload
 from simulation.reference import NAMES
 from simulation.visitors import Commands, Impostor, Listener, Rival, SecondLogger, Stranger
 
@@ -181,6 +182,7 @@ _KINDS: dict[Callable[[Random], Fault], int] = {
     lambda dice: SecondLogger(_when(dice), _fate(dice)): 3,
     lambda dice: Stranger(_when(dice), _STAYS, dice.choice(SOCKETS), dice.choice((5, 30, 600)), dice.randrange(999)): 3,
     lambda dice: Impostor(_when(dice), _STAYS, dice.choice(OWN)): 1,
+    lambda dice: Reload(_when(dice), _STAYS, tuple(dice.choices((*SOUND, *BROKEN), k=dice.randint(1, 3)))): 1,
     lambda dice: Rival(When(-1, dice.choice((0.0, dice.expovariate(1e4))))): 1,
 }
 

@@ -8,10 +8,13 @@ import tempfile
 import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from haploop.launch.clock import plugin_swap
 from simulation.plan import Plan
+from simulation.plugins import SimTrial
 from simulation.sim import Sim
 
 
@@ -40,9 +43,11 @@ def _seen_through(sim: Sim) -> Iterator[None]:
         sim.watch.fail("a traceback was printed:\n" + traceback.format_exc())
 
     traceback.print_exc, Path.iterdir = note, iterdir  # pyright: ignore[reportAttributeAccessIssue]
+    kept_trial, plugin_swap.PluginTrial = plugin_swap.PluginTrial, partial(SimTrial, sim)  # pyright: ignore
     try:
         yield
     finally:
+        plugin_swap.PluginTrial = kept_trial
         traceback.print_exc, Path.iterdir = kept, kept_iterdir  # pyright: ignore[reportAttributeAccessIssue]
 
 

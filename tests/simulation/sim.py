@@ -18,6 +18,7 @@ from simulation.computer.machine import Disk, SimRun
 from simulation.computer.world import Process, Stuck, World
 from simulation.faults import Fault, Kill, Signals
 from simulation.plan import Plan
+from simulation.plugins import Reload, broken_kept, with_plugin
 from simulation.reference import DEADLINE_S, difference, logged_ticks, scene_of, second_difference
 from simulation.watch import Watch
 
@@ -113,6 +114,8 @@ class Sim:
     def launch(self, run: SimRun) -> Any:
         self.claim("launcher")
         spec = RunSpec(self.scene, dict(KINDS), self.out, pace=self.plan.pace)
+        if any(isinstance(fault, Reload) for fault in self.plan.faults):
+            with_plugin(spec)
         return run_processes(spec, run.make_context, run.start_nodes, run.interrupts)
 
     def play(self) -> None:
@@ -212,6 +215,8 @@ class Sim:
         for out, of_second in self.second_logs:
             if summary and (broken := second_difference(self.plan.scene, events, of_second, out / "log.mcap")):
                 return broken
+        if taken := broken_kept(self.out):
+            return taken
         broken = difference(self.plan.scene, events, summary, log, self.watch.granted)
         if broken or log is None or not log.exists():
             return broken[0] if broken else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import random
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from simulation.sim import Sim
 
 _LOOK_S = 0.2
+_PYTHONS_WORDS = re.compile(r"\b[A-Z]\w*(Error|Exception)\b")
 _NO_PID = 2**22 + 1
 _JUNK = [*junk(), *out_of_place(), *false_joins(), *(encode("PROGRESS", tick, {}) for tick in range(0, 70, 5))]
 
@@ -102,6 +104,8 @@ class Commands(Visit):
                 sim.world.note(f"{verb}: {text}")
             except CommandRefused as error:
                 sim.world.note(f"{verb} refused: {error}")
+                if _PYTHONS_WORDS.search(str(error)):
+                    sim.watch.fail(f"{verb} {arguments!r:.80} was refused in Python's words: {error}")
             except RunNotFound:
                 if not sim.run.launcher.alive:
                     return

@@ -199,5 +199,6 @@ class Watch:
         if run is None or process is not run.launcher:
             return
         for pipe, owed in self._owed.items():
-            if owed > 0 and not pipe.near.is_closed:
+            is_tried = pipe.near.process.name.startswith("reload")  # a plugin, which takes time
+            if owed > 0 and not pipe.near.is_closed and not is_tried:
                 self.fail(f"{pipe.near.process.name} asked the clock, and {owed} times got no answer")

@@ -249,7 +249,7 @@ def _check_names(verb: str, act: Callable[..., Any], arguments: Message) -> None
 
 
 def _check_burden(arguments: Message) -> None:
-    """Raises ClockError where a command carries more than takes a moment to look through."""
+    """Raises ClockError where a command carries more than takes a moment to look through, or keys that are none."""
     left: list[tuple[Any, int]] = [(arguments, 0)]
     seen = 0
     while left:
@@ -264,4 +264,6 @@ def _check_burden(arguments: Message) -> None:
             raise ClockError(f"A text in a command has at most {_LONGEST} letters, but one has {len(value)}.")
         if isinstance(value, str) and is_exotic(value):
             raise ClockError(f"{value!r} has a unit that a running loop does not know; it knows {_UNITS}.")
+        if isinstance(value, dict) and (odd := [key for key in value if not isinstance(key, str)]):
+            raise ClockError(f"The keys of what a command carries are texts, but {odd[0]!r} was given as one.")
         left += [(one, depth + 1) for one in inner]
