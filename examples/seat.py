@@ -10,32 +10,23 @@ import gc
 import json
 import math
 import os
-import select
 import sys
 import threading
-import time
 from collections import deque
 from pathlib import Path
 
-import msgpack
 import zmq
+from clock import DONE, ENDED, FAILED, PROGRESS, READY, Clock
+from loop import LAST, SAMPLES, SAY_MS, Loop, SeatError
 from schedule import Schedule
-from sockets import VERSION, Sockets, pack
+from sockets import Sockets
 from telemetry import BLOCK_S, LONG_BLOCK_S, Telemetry
 
-JOIN, WELCOME, REFUSED, READY, GRANT, PROGRESS, WAITING, ENDED, DONE, FAILED, ABORT = range(1, 12)
-HELLO, SAMPLES, COMMANDS, LAST = range(20, 24)
 # What of a scene is not the plant's, or needs no more of it than one force in and one position out.
 KNOWN = {"title", "duration", "seed", "diverged_beyond", "clock", "device", "hand", "encoder", "run"}
 KNOWN |= {"wall", "velocity", "acceleration", "dissipation", "event"}
-DELAY = "clock.round_trip_delay"
-SAY_MS = 200
 # A controller that has not answered for so long does not lead a device any more.
 PATIENCE_S = 1.0
-
-
-class SeatError(Exception):
-    """What is wrong, in a sentence; reported to the clock as the reason of the failure."""
 
 
 def take_seat(name, version):
@@ -72,70 +63,32 @@ class Seat:
 
     def __init__(self, directory, start, program, is_external):
         self._sockets, self.hold = Sockets(directory, start["transport"]), lambda force: None
-        self._clock = self._sockets.open(zmq.DEALER)
-        self._sockets.connect(self._clock, start["address"])
-        self._loop, self._publisher = self._sockets.open(zmq.ROUTER), self._sockets.open(zmq.XPUB)
-        self._loop.router_mandatory, self._publisher.xpub_verbose, self._publisher.sndhwm = True, True, 256
-        self._loop.sndhwm = self._loop.rcvhwm = 0  # a plant that owns the time sends on while answers are late
+        self._clock = Clock(self._sockets, start["address"])
+        self._loop = Loop(self._sockets, start["secret"], lambda: self._clock.wait(self._tick, "controller"))
+        self._publisher = self._sockets.open(zmq.XPUB)
+        self._publisher.xpub_verbose, self._publisher.sndhwm = True, 256
         endpoints = {
-            "loop": self._sockets.bind(self._loop, "loop"),
+            "loop": self._loop.address,
             "telemetry": self._sockets.bind(self._publisher, "plant"),
         }
-        self._until, self._last, self._events, self._secret = 0, False, [], start["secret"]
-        self._say(JOIN, "plant", self._secret, os.getpid(), endpoints, True, program)
-        _, self.scene, timebase, _, _, self._told = self._welcome()
-        # The end of stdin tells of the end of a run; without it only silence does.
-        self._heard, self._silence_s = time.monotonic(), self.scene["run"]["deadline"] if is_external else math.inf
+        _, self.scene, timebase, _, _, self._told = self._clock.join(start["secret"], endpoints, program)
+        if is_external:
+            self._clock.give_up_after(self.scene["run"]["deadline"])
         self._delay = timebase["delay_steps"]
         self._n, self.step_s = timebase["plant_rate"] // timebase["control_rate"], 1.0 / timebase["plant_rate"]
 
-    # The clock
-
-    def _say(self, code, *fields):
-        self._clock.send(pack(code, *fields))
-
-    def _welcome(self):
-        while True:
-            if not self._clock.poll(20_000):
-                raise SystemExit("The clock did not answer within 20 s.")
-            _, code, *fields = msgpack.unpackb(self._clock.recv(), strict_map_key=False)
-            if code == WELCOME:
-                return fields
-            if code in (REFUSED, ABORT):
-                raise SystemExit(fields[0])
-
-    def _listen(self, wait_ms=0):
-        """Takes what the clock has sent, waits for the first message for at most so long; tells whether any came."""
-        heard = False
-        while self._clock.poll(wait_ms):
-            _, code, *fields = msgpack.unpackb(self._clock.recv(), strict_map_key=False)
-            if code == GRANT:
-                until, self._last, events = fields
-                self._until = max(self._until, until)
-                self._events += [(tick, event["set"][DELAY]) for tick, event in events if DELAY in event.get("set", {})]
-            elif code == ABORT:
-                raise SystemExit(fields[0])
-            wait_ms, heard, self._heard = 0, True, time.monotonic()
-        return heard
-
     def _await_grant(self):
-        if self._tick < self._until or self._last:
+        if self._tick < self._clock.until or self._clock.last:
             return
-        self._say(PROGRESS, self._tick, {})
+        self._clock.say(PROGRESS, self._tick, {})
         if self._owns_time and self._tick:
-            self._listen()
-            if self._tick >= self._until and not self._last:
+            self._clock.listen()
+            if self._tick >= self._clock.until and not self._clock.last:
                 raise SeatError(f"Tick {self._tick} was not granted in time; set run.window_blocks to more.")
-        while self._tick >= self._until and not self._last:
-            if not self._listen(SAY_MS if self._tick == self._telemetry.first else int(BLOCK_S * 1000)):
+        while self._tick >= self._clock.until and not self._clock.last:
+            if not self._clock.listen(SAY_MS if self._tick == self._telemetry.first else int(BLOCK_S * 1000)):
                 self._flush()
-                self._idle("clock")
-
-    def _idle(self, on):
-        self._say(WAITING, self._tick, on)
-        self._listen()
-        if time.monotonic() - self._heard > self._silence_s:
-            raise SystemExit(f"Nothing was heard of the clock for {self._silence_s:g} s; is the run still there?")
+                self._clock.wait(self._tick, "clock")
 
     # The run
 
@@ -156,12 +109,12 @@ class Seat:
                 hold(0.0)  # first of all
         except Exception as error:
             self.fail(str(error) if isinstance(error, SeatError) else f"{type(error).__name__}: {error}")
-        self._say(DONE, self._tick, {"lateness": self._schedule.figures()} if self._owns_time else {})
+        self._clock.say(DONE, self._tick, {"lateness": self._schedule.figures()} if self._owns_time else {})
         self._sockets.close()
 
     def fail(self, why):
         """Tells the clock why there is no going on, and ends this process."""
-        self._say(FAILED, -1, why)
+        self._clock.say(FAILED, -1, why)
         self._sockets.close()
         raise SystemExit(1)
 
@@ -174,30 +127,30 @@ class Seat:
         self._schedule = Schedule(self._n * self.step_s, self._delay * self.step_s)
         block_s = LONG_BLOCK_S if self._owns_time else BLOCK_S
         self._telemetry = Telemetry(self._publisher, self.scene["run"]["block_ticks"], self._state, block_s)
-        self._greet()
+        self._loop.greet()
         self._serve_first()
-        self._say(READY, 0)
+        self._clock.say(READY, 0)
         gc.freeze()
         reason = ""
         while not reason:
             self._await_grant()
-            if self._tick >= self._until:
+            if self._tick >= self._clock.until:
                 break
             self._sample()
             reason = self._unusable() or (self._tick_in_time() if self._owns_time else self._await_answer())
             reason = reason or self._interval(step)
             if self._telemetry.is_due():
                 self._flush()
-                self._listen()
-        self._send(LAST, self._tick)
+                self._clock.listen()
+        self._loop.send(LAST, self._tick)
         self._flush()
         self._telemetry.end(self._tick, reason)
         if reason:
-            self._say(ENDED, self._tick, reason)
+            self._clock.say(ENDED, self._tick, reason)
 
     def _delay_at(self, tick):
-        while self._events and self._events[0][0] <= tick:
-            self._delay = round(self._events.pop(0)[1] / self.step_s)
+        while self._clock.delays and self._clock.delays[0][0] <= tick:
+            self._delay = round(self._clock.delays.pop(0)[1] / self.step_s)
         return self._delay
 
     def _measured(self):
@@ -233,7 +186,7 @@ class Seat:
     def _tick_in_time(self):
         """Holds the force of this tick and takes answers until the next is due; returns why the run has to end here."""
         self._schedule.begin(self._tick)
-        while self._ready_by(0.0):
+        while self._loop.ready_by(0.0):
             self._take_answer()
         if self._tick - self._answered > PATIENCE_S / (self._n * self.step_s):
             return f"the controller had not answered for {PATIENCE_S:g} s, at tick {self._tick}"
@@ -241,49 +194,18 @@ class Seat:
             return reason
         self._take_due(self._tick * self._n)
         self.hold(self._force)
-        while self._ready_by(self._schedule.due(self._tick + 1)):
+        while self._loop.ready_by(self._schedule.due(self._tick + 1)):
             self._take_answer()
         return ""
 
-    def _ready_by(self, when):
-        """Waits for a message of the loop up to a time, to less than a ms; tells whether there is one."""
-        while not self._loop.getsockopt(zmq.EVENTS) & zmq.POLLIN:
-            if (left := when - time.monotonic()) <= 0.0:
-                return False
-            select.select([self._loop], [], [], left)
-        return True
-
     # The controller
-
-    def _greet(self):
-        self._partner = None
-        while self._partner is None:
-            sender, frame = self._hear()
-            if frame == [VERSION, HELLO, self._secret]:
-                self._partner = sender
-                self._send(HELLO, self._secret)
-
-    def _hear(self):
-        while not self._loop.poll(SAY_MS):
-            self._idle("controller")
-        sender, *frames = self._loop.recv_multipart()
-        try:
-            return sender, msgpack.unpackb(frames[-1])
-        except Exception:  # anything may come from a stranger
-            return sender, None
-
-    def _send(self, *message):
-        try:
-            self._loop.send_multipart([self._partner, pack(*message)])
-        except zmq.ZMQError:  # the controller has gone, which the clock sees too
-            self._idle("controller")
 
     def _sample(self):
         tick, effect = self._tick, self._tick * self._n + self._delay_at(self._tick)
         while self._coming and self._coming[-1][0] > effect:
             self._coming.pop()
         self._coming.append([effect, None, tick])
-        self._send(SAMPLES, tick, [[self._measured()]])
+        self._loop.send(SAMPLES, tick, [[self._measured()]])
 
     def _await_answer(self):
         while self._answered <= self._tick:
@@ -291,19 +213,14 @@ class Seat:
         return self._unusable()
 
     def _take_answer(self):
-        sender, frame = self._hear()
-        if sender != self._partner:
-            return
         tick = self._answered
-        match frame:
-            case [version, code, of, [int() | float() as force]] if [version, code, of] == [VERSION, COMMANDS, tick]:
-                pass
-            case _:
-                raise SeatError(f"A command of tick {tick} was expected of the controller, but {str(frame)[:80]} came.")
+        force = self._loop.answer(tick)
+        if force is None:  # a stranger's
+            return
         self._answered += 1
         awaited = [command for command in self._coming if command[2] == tick]
         if awaited:
-            awaited[0][1] = float(force)
+            awaited[0][1] = force
         if self._owns_time:
             self._schedule.answered(tick, not awaited)
 
@@ -314,13 +231,13 @@ class Seat:
 
     def _serve_first(self):
         while not self._telemetry.serve(SAY_MS):
-            self._idle("logger")
+            self._clock.wait(self._tick, "logger")
 
     def _flush(self):
         """Publishes what was done since the last block, and reports it to the clock."""
         if self._telemetry.flush():
             status = {"lateness": self._schedule.figures()} if self._owns_time and self._schedule.says_so() else {}
-            self._say(PROGRESS, self._tick, status)
+            self._clock.say(PROGRESS, self._tick, status)
 
 
 def _beyond(scene):

@@ -1,7 +1,8 @@
 """Other people's solvers as plants of figure 6(b), judged by the books: a table of docs/accuracy.md.
 
-usage: python tests/bench/plants.py PAGE, by `make accuracy`. What is not installed is left out, with a word. The
-environment's STATE_SPACE_FMU names the Reference FMUs' StateSpace.fmu, built with FIXED_SOLVER_STEP 1e-3.
+usage: python tests/bench/plants.py PAGE, by `make accuracy`. What is not installed keeps the row that the page has of
+it, with a word. The environment's STATE_SPACE_FMU names the Reference FMUs' StateSpace.fmu, built with
+FIXED_SOLVER_STEP 1e-3.
 """
 
 import importlib.util
@@ -78,29 +79,37 @@ def measured(solver: Solver | None, out: Path) -> tuple[np.ndarray, float, str]:
     return np.asarray(haploop.logger.read(out)["/plant"]["x"]), energy["residual_J"] / energy["moved_J"], said
 
 
-def section(directory: Path) -> str:
-    """Returns the section: intro, table and note."""
+def section(directory: Path, before: str) -> str:
+    """Returns the section, intro, table and note, with the rows of ``before`` for what cannot be measured here."""
+    kept = {cells[1].strip(): [cell.strip() for cell in cells[1:5]] for cells in map(_cells, before.splitlines())}
     exact, residual, said = measured(None, directory / "exact")
     rows = [("haploop, exact flow", "–", f"{residual:.1e}", said)]
     missing: dict[str, list[str]] = {}
     for number, solver in enumerate(SOLVERS):
         if lacks := solver.lacks:
             missing.setdefault(lacks, []).append(solver.name)
+            rows += [tuple(kept[solver.name])] if solver.name in kept else []
             continue
         x, residual, said = measured(solver, directory / str(number))
         rows.append((solver.name, amount(float(np.abs(x - exact).max()), "m", 2), f"{residual:.1e}", said))
-    left_out = [f"Left out, since there is no {lacks}: {', '.join(names)}." for lacks, names in missing.items()]
+    left_out = [f"Not measured anew, for want of {lacks}: {', '.join(names)}." for lacks, names in missing.items()]
     there = sorted({solver.package for solver in SOLVERS if not solver.lacks})
     made = f"Measured with {', '.join(f'{package} {version(package)}' for package in there)}." if there else ""
     table = markdown_table(("plant", "distance", "residual", "said of it"), rows)
     return "\n\n".join([TITLE, INTRO, table, NOTE, *left_out, *([made] if made else [])]) + "\n"
 
 
+def _cells(line: str) -> list[str]:
+    cells = line.split("|")
+    return cells if len(cells) == 6 else [""] * 6
+
+
 def main() -> None:
     page = Path(sys.argv[1])
+    text = page.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as directory:
-        made = section(Path(directory))
-    sections = [one for one in page.read_text(encoding="utf-8").split("\n## ") if not one.startswith(TITLE)]
+        made = section(Path(directory), text)
+    sections = [one for one in text.split("\n## ") if not one.startswith(TITLE)]
     sections.insert(-1, made)  # the last one tells the machine
     page.write_text("\n## ".join(sections), encoding="utf-8")
     print(made)

@@ -1,5 +1,6 @@
 """The clock at its socket: who is let in, and what it does between two grants."""
 
+import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +12,7 @@ import zmq
 
 from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.clock.server import ClockServer
-from haploop.launch.processes.standstill import late_observers
+from haploop.launch.processes.standstill import busy, late_observers
 from haploop.protocol.transport.messages import PROCESSES
 from helpers.live.attacks import Stranger, pack
 from helpers.runs.clocks import clock
@@ -146,3 +147,10 @@ def test_an_observer_that_holds_the_run_and_is_silent_or_never_ready_is_taken_of
     ]
     roster.discount_silence(20.0)
     assert late_observers(roster, 30.0, 5.0) == []
+
+
+def test_a_machine_that_has_too_much_to_do_is_told_of_and_another_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    for load, said in ((6.0, ""), (20.2, " The machine was busy: load average 20 on 2 cores.")):
+        monkeypatch.setattr(os, "getloadavg", lambda load=load: (load, 0.0, 0.0))
+        assert busy() == said

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.spec import RunFailed
@@ -28,6 +30,12 @@ def late_observers(roster: Roster, now: float, deadline_s: float) -> list[tuple[
         elif not node.ready and now - node.joined > START_DEADLINE_S:
             late.append((node, f"You were not ready within {START_DEADLINE_S:g} s; {_WITHOUT_YOU}"))
     return late
+
+
+def busy() -> str:
+    """Returns a sentence on a machine with far more to do than it can, which may be why a node is silent; else ""."""
+    load, cores = os.getloadavg()[0], os.cpu_count() or 1
+    return f" The machine was busy: load average {load:.0f} on {cores} cores." if load > 3 * cores else ""
 
 
 class Standstill:

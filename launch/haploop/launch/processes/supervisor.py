@@ -25,7 +25,7 @@ from haploop.launch.processes.awaited import Awaited
 from haploop.launch.processes.children import Child, interrupts, start_children
 from haploop.launch.processes.foreign import Program
 from haploop.launch.processes.shown_prints import PRINTS, ShownPrints
-from haploop.launch.processes.standstill import START_DEADLINE_S, Standstill, late_observers
+from haploop.launch.processes.standstill import START_DEADLINE_S, Standstill, busy, late_observers
 from haploop.launch.spec import OutputError, RunFailed, RunSpec
 from haploop.protocol.changes import Event
 from haploop.protocol.ticks import Timebase
@@ -124,11 +124,7 @@ class Supervisor:
         run_directory.announce(sockets, here, scene.title, str(spec.out), keys)
         run_number = len(run_directory.live_runs()) - 1
         self._prints = ShownPrints(spec.out.resolve() / PRINTS)
-        start = {
-            "address": here,
-            "secret": secret,
-            "prints": str(spec.out.resolve() / PRINTS),
-        }
+        start = {"address": here, "secret": secret, "prints": str(spec.out.resolve() / PRINTS)}
 
         def told_to(role: str) -> Message:
             if role in spec.programs and spec.programs[role].is_external:  # perhaps on another host
@@ -241,7 +237,7 @@ class Supervisor:
                 ended = "given up" if roster.is_external(node.role) else "ended"
                 raise RunFailed(
                     f"The {roster.label(node.role)} has not answered for {deadline_s:g} s and was {ended}; "
-                    f"{self._where()} A longer wait can be set with run.deadline."
+                    f"{self._where()}{busy()} A longer wait can be set with run.deadline."
                 )
         for node, why in late_observers(roster, now, self._deadline_s):
             self._server.drop(node, why)
