@@ -15,36 +15,15 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
-from yardsticks import ping_pong_us, plain_loop_us
+from yardsticks import SCENE, loop_us, ping_pong_us, plain_loop_us
 
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
-from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.file import load
 from haploop.logger.books import segments
 from haploop.logger.summary import versions
 from haploop.plant.friction import motion
 from haploop.tools.machine import machine
-
-SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
-
-
-def _loop_us(delay_s: float, log: str, seconds: float) -> Callable[[], float]:
-    """Wall time per tick of figure 6c as processes, logged to disk."""
-
-    def measure() -> float:
-        with tempfile.TemporaryDirectory() as folder:
-            settings = [
-                f"clock.round_trip_delay={delay_s}",
-                f"duration={seconds}",
-                f"run.log={log}",
-                "run.verdict=window",
-                "diverged_beyond=1e9",
-            ]
-            summary = run(prepare(SCENE, settings, out=Path(folder, "out")))
-            return summary["wall_s"] / summary["ticks"] * 1e6
-
-    return measure
 
 
 def _in_process_us(seconds: float) -> float:
@@ -96,10 +75,10 @@ ROWS: dict[str, tuple[Callable[[], float], str, str, float]] = {
     # what: (measure, unit, yardstick, target as a ratio; 0 for an absolute one)
     "ping-pong": (ping_pong_us, "us/tick", "", 0.0),
     "plain loop": (plain_loop_us, "us/tick", "", 0.0),
-    "processes, d = 0, every step logged": (_loop_us(0.0, "steps", 20.0), "us/tick", "ping-pong", 1.3),
-    "processes, d = 2 ms, every step logged": (_loop_us(0.002, "steps", 10.0), "us/tick", "ping-pong", 0.8),
-    "processes, d = 10 ms, every step logged": (_loop_us(0.010, "steps", 20.0), "us/tick", "ping-pong", 0.6),
-    "processes, d = 10 ms, ticks logged": (_loop_us(0.010, "ticks", 20.0), "us/tick", "ping-pong", 0.4),
+    "processes, d = 0, every step logged": (loop_us(0.0, "steps", 20.0), "us/tick", "ping-pong", 1.3),
+    "processes, d = 2 ms, every step logged": (loop_us(0.002, "steps", 10.0), "us/tick", "ping-pong", 0.8),
+    "processes, d = 10 ms, every step logged": (loop_us(0.010, "steps", 20.0), "us/tick", "ping-pong", 0.6),
+    "processes, d = 10 ms, ticks logged": (loop_us(0.010, "ticks", 20.0), "us/tick", "ping-pong", 0.4),
     "one process, books, no log": (lambda: _in_process_us(20.0), "us/tick", "plain loop", 8.0 / 2.7),
     "the same with cable, grip, friction": (_realistic_us(10.0, by_loops=False), "us/tick", "plain loop", 0.0),
     "the same by numba's loops": (_realistic_us(10.0, by_loops=True), "us/tick", "plain loop", 0.0),

@@ -1,4 +1,4 @@
-"""Yardsticks of speed: the bare ping-pong of the transport, and the bare loop of the arithmetic."""
+"""Yardsticks of speed: the bare ping-pong of the transport, the bare loop of the arithmetic; and a run as processes."""
 
 from __future__ import annotations
 
@@ -6,14 +6,17 @@ import math
 import multiprocessing
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import msgpack
 import zmq
 
 from haploop.launch.processes.children import share_cores
+from haploop.launch.runs.start import prepare, run
 from haploop.plant.motion.transition import make_foh_transition
 
+SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
 _pack = msgpack.Packer(autoreset=True).pack
 
 
@@ -90,3 +93,21 @@ def plain_loop_us(ticks: int = 20_000) -> float:
     took = (time.perf_counter() - began) / ticks * 1e6
     assert math.isfinite(x)
     return took
+
+
+def loop_us(delay_s: float, log: str, seconds: float) -> Callable[[], float]:
+    """Wall time per tick of figure 6c as processes, logged to disk."""
+
+    def measure() -> float:
+        with tempfile.TemporaryDirectory() as folder:
+            settings = [
+                f"clock.round_trip_delay={delay_s}",
+                f"duration={seconds}",
+                f"run.log={log}",
+                "run.verdict=window",
+                "diverged_beyond=1e9",
+            ]
+            summary = run(prepare(SCENE, settings, out=Path(folder, "out")))
+            return summary["wall_s"] / summary["ticks"] * 1e6
+
+    return measure

@@ -89,9 +89,9 @@ class ChainBooks:
         cut = end_to_end(first_step, {name: column[:, places] for name, column in whole.items()}, in_order)
         anew = self._of_run(0, cut, joined(tau), joined(dx)[:-1], [joined(force)[:-1] for force in commanded])
         others = np.setdiff1d(np.arange(shape[1]), places)
-        of_others = [part if part.shape[-1] == 1 else part[:, others] for part in (tau, dx, *commanded)]
+        tau_of, dx_of, *forces = (part if part.shape[-1] == 1 else part[:, others] for part in (tau, dx, *commanded))
         uncut = {name: column[:, others] for name, column in whole.items()}
-        for flow, of_cut in zip(self._of_run(first_step, uncut, *of_others[:2], of_others[2:]), anew, strict=True):
+        for flow, of_cut in zip(self._of_run(first_step, uncut, tau_of, dx_of, forces), anew, strict=True):
             both = np.empty(dx.shape)
             both[:, others], both[:, places] = flow, np.append(of_cut, 0.0).reshape(-1, rows).T[:-1]
             yield both

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from haploop.protocol.trees import tree_select
 Columns = dict[str, np.ndarray]
 # Those of a batch; with friction ``pieces``, a list of (place of a member, columns of its pieces), stands beside them.
 BatchColumns = dict[str, Any]
+# (forms of all products, form of the lag integral) by level and by whether body 0 is stuck.
+Made = dict[tuple[int, bool], tuple[np.ndarray, np.ndarray]]
 # A part of a step is counted in 2^-62 of it: whole numbers, whose sums over many steps may overflow unharmed.
 _FINEST = 62
 # So many segments of a kind are integrated by themselves; fewer together with others, each by coefficients of its own.
@@ -142,6 +145,12 @@ def _elapsed(step: np.ndarray, level: np.ndarray) -> np.ndarray:
     return (over - over[first]).astype(float) / 2.0**_FINEST
 
 
+@lru_cache(maxsize=16)
+def _made_of(_chain: str) -> Made:
+    """Returns the forms made so far of a chain, written out: runs of one device in one process share them."""
+    return {}
+
+
 class ChainForms:
     """The integrals that the books need, of any segments; the forms of a level are made when it first occurs.
 
@@ -160,13 +169,14 @@ class ChainForms:
         self._chain = chain
         heats = [f"{name}_heat" for name in (*chain.grounded, *(link.name for link in chain.links))]
         self.names = [*heats, *["lag"] * (chain.actuator_rate is not None), "lag_integral"]
-        self._made: dict[tuple[int, bool], tuple[np.ndarray, np.ndarray]] = {}
+        self._made: Made = {}
         self._of_batch = of_batch
         if of_batch:
             rates, *forms = make_tables(lambda one: _tables(one, step_s), chain, has_members=True)
             self._real: Any = np.float64
             self._rates, self._made[0, False] = {False: rates}, (forms[0], forms[1])
             return
+        self._made = _made_of(repr((replace(chain, spring=(chain.spring[0], 0.0), start=(0.0, 0.0)), step_s)))
         self._flows = {stuck: ChainIntegrals(chain, step_s, stuck) for stuck in (False, True)}
         self._real = chain.real_for(step_s)
         self._rates = {stuck: chain.rates(stuck).astype(self._real) for stuck in (False, True)}
