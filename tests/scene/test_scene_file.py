@@ -141,6 +141,9 @@ def test_the_outline_of_every_shipped_scene_is_what_toml_reads():
 def test_what_is_no_toml_has_no_outline_and_its_own_words():
     assert outline("a = \n[b]\nb = 1\n") is None
     assert outline("a = 1\n[a.b]\n") is None
+    windows = outline("a = 1\r\nb = [\r\n1]\r\nc = 2\r\n")
+    assert windows
+    assert windows.at == {("a",): 1, ("b",): 2, ("c",): 4}
     doubled = outline("a = 1\na = 2\n")
     assert doubled
     assert doubled.doubled == [(("a",), 1, 2)]

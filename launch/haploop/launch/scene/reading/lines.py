@@ -106,7 +106,7 @@ def _statements(text: str) -> Iterator[tuple[int, str, Tables]]:
     """
     held: list[str] = []
     begun = depth = 0
-    for number, line in enumerate(text.split("\n"), start=1):
+    for number, line in enumerate(text.replace("\r\n", "\n").split("\n"), start=1):
         if not held:
             if not line.strip() or line.lstrip().startswith("#"):
                 continue
