@@ -145,6 +145,19 @@ def test_an_element_of_any_kind_comes_to_what_it_comes_to_alone(element: type[El
     assert (compiling()[0] > count) == (element is Gripping)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "own",
+    [{"kind": "hunt-crossley", "damping_factor": 2.0}, {"kind": "texture", "ridge_force": 0.2, "ridge_spacing": 1e-4}],
+)
+def test_walls_that_are_no_springs_compile_with_the_books_of_what_their_law_takes(own: dict[str, Any]) -> None:
+    count, clock = compiling()[0], {"plant_rate": 2000, "round_trip_delay": 0.0015}
+    walls = [{"position": -0.002, "stiffness": 200.0 + i, **own} for i in range(3)]
+    scenes = [pressed(duration=0.1, clock=clock, wall=wall) for wall in walls]
+    assert agree(compiled(scenes), run_batch(scenes, KINDS))
+    assert compiling()[0] > count
+
+
 def test_bodies_in_a_row_go_their_own_way_to_the_same_bits() -> None:
     scenes = many(2, friction={"kinetic": 0.01}, hand=PUSH)
     assert compiled(scenes) == run_batch(scenes, KINDS)

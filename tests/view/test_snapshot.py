@@ -86,6 +86,17 @@ def test_no_telemetry_gives_an_empty_snapshot():
     assert drawn(History(TIME, 0), span_s=None)["tables"] == {}
 
 
+def test_of_a_wall_that_is_no_spring_the_loop_has_the_curve_that_it_stores() -> None:
+    ridged = Wall.from_dict({"kind": "texture", "position": 0.0, "stiffness": 100.0, "ridge_force": 2.0,
+                             "ridge_spacing": 8.0, "occupies": "above"})  # fmt: skip
+    depth, force = drawn(made_up(wall=ridged))["tables"]["loop"]["curve"]
+    assert (depth[0], depth[-1]) == (0.0, 999.0)
+    ridge = (np.array(depth) / 8.0) % 1.0
+    arcs = np.where(ridge < 0.5, 16 * ridge * (0.5 - ridge), -16 * (ridge - 0.5) * (1.0 - ridge))
+    np.testing.assert_allclose(force, 100.0 * np.array(depth) + 2.0 * arcs, rtol=1e-12)
+    assert "curve" not in drawn(made_up())["tables"]["loop"]
+
+
 def test_without_a_wall_there_is_none_to_draw_and_no_loop():
     tables = drawn(made_up(wall=None))["tables"]
     assert "loop" not in tables
