@@ -15,7 +15,7 @@ A wall is run, and another one steered while it runs:
         steadied = loop.finish()
 
 Values are numbers in SI units, text with a unit or quantities of pint; a wrong name is told with the nearest. Nothing
-is imported before it is first used. A program that sweeps or advises starts workers, which import it
+is imported before it is first used. A program that sweeps, advises or compares starts workers, which import it
 again: begin it with ``if __name__ == "__main__":``, as multiprocessing asks.
 """
 
@@ -26,14 +26,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from haploop.api.live import LiveLoop, attach, start
-    from haploop.api.studies import advise, dissipate, plot, sweep
+    from haploop.api.studies import advise, compare, dissipate, plot, sweep
     from haploop.launch.runs.loaded_scene import LoadedScene as Scene
     from haploop.launch.runs.loaded_scene import load
     from haploop.launch.runs.result import Result, run
     from haploop.logger.log.stream import read
 
 __all__ = [
-    "LiveLoop", "Result", "Scene", "advise", "attach", "dissipate", "load", "plot", "read", "run", "start",
+    "LiveLoop", "Result", "Scene", "advise", "attach", "compare", "dissipate", "load", "plot", "read", "run", "start",
     "sweep",
 ]  # fmt: skip
 
@@ -44,7 +44,7 @@ _HOMES = {
     "run": "launch.runs.result.run",
     "read": "logger.log.stream.read",
     **{name: f"api.live.{name}" for name in ("LiveLoop", "attach", "start")},
-    **{name: f"api.studies.{name}" for name in ("advise", "dissipate", "plot", "sweep")},
+    **{name: f"api.studies.{name}" for name in ("advise", "compare", "dissipate", "plot", "sweep")},
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import subprocess
 import sys
@@ -10,7 +11,7 @@ import time
 import weakref
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +28,32 @@ from haploop.logger.session import LOG
 from haploop.logger.summary import SUMMARY
 from haploop.logger.summary import read as read_summary
 
-_LOOK_S, _BEGINS_WITHIN_S, _ENDS_WITHIN_S = 0.01, 60.0, 20.0
+_LOOK_S, _ENDS_WITHIN_S, _TOLD = 0.01, 20.0, "told.txt"
 # Simulated seconds per second of a run that is to stand still at its start: no tick after the first is due.
 _STANDING = 1e-6
+
+
+class _Started(NamedTuple):
+    """A run that this program started: its process, a folder of scratch files, and whether its files are kept."""
+
+    process: subprocess.Popen[bytes]
+    scratch: tempfile.TemporaryDirectory[str]
+    keeps: bool
+
+    def told(self) -> str:
+        """Returns what the run said of itself."""
+        return Path(self.scratch.name, _TOLD).read_text(encoding="utf-8").strip()
+
+    def end(self) -> None:
+        """Ends the run in order if it still goes on, or at once where it takes too long."""
+        if self.process.poll() is None:
+            self.process.terminate()
+            try:
+                self.process.wait(_ENDS_WITHIN_S)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                self.process.wait()
+        self.scratch.cleanup()
 
 
 def start(
@@ -41,8 +65,8 @@ def start(
         scene: a loaded scene, or the path or name of one.
         out: directory for log, summary and scene, new or empty; when None, nothing is left of it.
         pace: simulated seconds per second; infinite for as fast as it goes, 1 for real time.
-        paused: stand still at the first ticks, until ``step`` or ``resume``. What is then changed between steps takes
-            effect at the same tick every time, and gives the same bits.
+        paused: stand still at the first tick, until ``step`` or ``resume``. What is changed between steps takes effect
+            at the same tick every time, and gives the same bits.
 
     Raises:
         SceneError, ElementError, PluginError: the scene cannot be run.
@@ -50,33 +74,30 @@ def start(
     """
     scene = scene if isinstance(scene, LoadedScene) else load(scene)
     scratch = tempfile.TemporaryDirectory(prefix="haploop-")
-    file, told = Path(scratch.name, SCENE), Path(scratch.name, "told.txt")
+    file, directory = Path(scratch.name, SCENE), Path(scratch.name, "run") if out is None else Path(out)
     file.write_text(str(scene), encoding="utf-8")
-    directory = Path(scratch.name, "run") if out is None else Path(out)
     words = [sys.executable, "-m", "haploop.tools.cli", "run", str(file), "--out", str(directory), "--json"]
     words += ["--pace", repr(_STANDING) if paused else "free" if math.isinf(pace) else repr(float(pace))]
     words += [word for plugin in dict.fromkeys(scene.plugin_files.values()) for word in ("--plugin", str(plugin))]
-    with told.open("w", encoding="utf-8") as errors:
+    with Path(scratch.name, _TOLD).open("w", encoding="utf-8") as errors:
         # In a group of its own: Ctrl-C is for this program, which ends the run in order.
         process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=errors, process_group=0)
-    give_up = time.monotonic() + _BEGINS_WITHIN_S
-    while process.poll() is None and time.monotonic() < give_up:
-        found = [run for run in run_directory.live_runs() if run.pid == process.pid]
-        if found:
-            loop = LiveLoop(found[0], scene, process, scratch, None if out is None else directory, told)
-            if paused:
-                loop.pause()
-                loop.pace(pace)
-            return loop
+    started = _Started(process, scratch, out is not None)
+    found: list[LiveRun] = []
+    while not found and process.poll() is None:
         time.sleep(_LOOK_S)
-    process.terminate()
-    process.wait()
-    why = told.read_text(encoding="utf-8").strip()
-    if (directory / SUMMARY).exists():  # a short run, over before it was looked for
-        run = LiveRun("", None, process.pid, "", scene["title"], str(directory))
-        return LiveLoop(run, scene, process, scratch, None if out is None else directory, told)
-    scratch.cleanup()
-    raise RunFailed(why)
+        found = [run for run in run_directory.live_runs() if run.pid == process.pid]
+    if not found and process.returncode:
+        why = started.told()
+        started.end()
+        raise RunFailed(why)
+    # A short one may be over before it was seen.
+    run = found[0] if found else LiveRun("", None, process.pid, "", scene["title"], str(directory))
+    loop = LiveLoop(run, scene, started)
+    if paused:
+        loop.pause()
+        loop.pace(pace)
+    return loop
 
 
 def attach(run_id: str | None = None, *, at: str | None = None, keys: str | Path | None = None) -> LiveLoop:
@@ -105,19 +126,10 @@ class LiveLoop:
         id: by which ``haploop --run ID`` finds it.
     """
 
-    def __init__(
-        self,
-        run: LiveRun,
-        scene: LoadedScene | None = None,
-        process: subprocess.Popen[bytes] | None = None,
-        scratch: tempfile.TemporaryDirectory[str] | None = None,
-        directory: Path | None = None,
-        told: Path | None = None,
-    ) -> None:
-        self.id, self._run, self._scene, self._process = run.id, run, scene, process
-        self._directory, self._told = directory, told
+    def __init__(self, run: LiveRun, scene: LoadedScene | None = None, started: _Started | None = None) -> None:
+        self.id, self._run, self._scene, self._started = run.id, run, scene, started
         self._result: Result | None = None
-        self._end = weakref.finalize(self, _end, process, scratch) if process and scratch else lambda: None
+        self._end = weakref.finalize(self, started.end) if started else lambda: None
 
     def __repr__(self) -> str:
         return f"<LiveLoop {self.id}: {self._run.title!r}>"
@@ -195,8 +207,9 @@ class LiveLoop:
 
     def finish(self) -> Result:
         """Lets the run go on if it stands still, to its end, and returns its result."""
-        if self._process and self._process.poll() is None and self.status()["paused"]:
-            self.resume()
+        with contextlib.suppress(RunNotFound):  # it has ended
+            if self.status()["paused"]:
+                self.resume()
         return self.wait()
 
     def wait(self, timeout_s: float | None = None) -> Result:
@@ -207,43 +220,22 @@ class LiveLoop:
             RunFailed: it could not go on.
             RunNotFound: it was one elsewhere, whose files are not on this machine.
         """
-        if self._result is None:
-            self._result = self._ended(timeout_s)
-        return self._result
-
-    def _ended(self, timeout_s: float | None) -> Result:
-        late = TimeoutError(f"The run {self.id} still goes on after {timeout_s} s.")
-        give_up = math.inf if timeout_s is None else time.monotonic() + timeout_s
-        if self._process:
-            try:
-                self._process.wait(timeout_s)
-            except subprocess.TimeoutExpired:
-                raise late from None
-            if self._process.returncode and self._told:
-                raise RunFailed(self._told.read_text(encoding="utf-8").strip())
-        elif not self._run.is_here:
+        started, run = self._started, self._run
+        if self._result:
+            return self._result
+        if not started and not run.is_here:
             raise RunNotFound(f"The run at {self.id} leaves its files on its own host; wait for its end there.")
-        while not self._process and run_directory.has_launcher(self._run):
+        give_up = math.inf if timeout_s is None else time.monotonic() + timeout_s
+        while started.process.poll() is None if started else run_directory.has_launcher(run):
             if time.monotonic() > give_up:
-                raise late
+                raise TimeoutError(f"The run {self.id} still goes on after {timeout_s} s.")
             time.sleep(_LOOK_S)
-        directory = Path(self._run.out)
-        scene = self._scene or LoadedScene(load_resolved(directory / SCENE), directory / SCENE)
-        kept = None
-        if self._process and self._directory is None:
+        if started and started.process.returncode:
+            raise RunFailed(started.told())
+        directory, kept = Path(run.out), None
+        if started and not started.keeps:
             kept = haploop.logger.read(directory) if (directory / LOG).exists() else Recording({}, "", {})
-        result = Result(scene, read_summary(directory / SUMMARY), None if kept is not None else directory, kept)
+        scene = self._scene or LoadedScene(load_resolved(directory / SCENE), directory / SCENE)
+        self._result = Result(scene, read_summary(directory / SUMMARY), None if kept is not None else directory, kept)
         self._end()
-        return result
-
-
-def _end(process: subprocess.Popen[bytes], scratch: tempfile.TemporaryDirectory[str]) -> None:
-    """Ends a run in order if it still goes on, or at once where it takes too long, and removes what it was told by."""
-    if process.poll() is None:
-        process.terminate()
-        try:
-            process.wait(_ENDS_WITHIN_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-    scratch.cleanup()
+        return self._result

@@ -1,9 +1,10 @@
-"""Many scenes, recordings and figures from Python: sweep, advise, dissipate, plot."""
+"""Many scenes, recordings and figures from Python: sweep, advise, compare, dissipate, plot."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,8 @@ from haploop.launch.scene.toml_writer import to_toml
 
 if TYPE_CHECKING:
     from haploop.tools.advise.advice import Advice
+    from haploop.tools.advise.subject import Subject
+    from haploop.tools.compare.comparison import Comparison
     from haploop.tools.dissipate.outcome import Outcome
     from haploop.tools.sweep.table import SweepTable
 
@@ -88,20 +91,52 @@ def advise(
     Raises:
         InvalidRequest, SceneError, PluginError, ElementError: a name is none, or the scene cannot be run.
     """
-    from haploop.launch.scene.events import elements_of, try_out
     from haploop.tools.advise.advice import advice
     from haploop.tools.advise.command import WALLS
-    from haploop.tools.advise.subject import make_subject
     from haploop.tools.advise.walls.trial import Store, Trial
+
+    subject = _subject(device, hand, delay, estimator, values, plugins)
+    with _kept(out, WALLS) as walls, Trial(Store(walls), workers, lambda runs: None) as trial:
+        return advice(subject, trial, lambda stage: None)
+
+
+def compare(
+    device: str | Path, *, grid: bool = True, workers: int | None = None, out: str | Path | None = None, **asked: Any
+) -> Comparison:
+    """Compares every stabilizer, each tuned alike, on a device or a scene; takes minutes to an hour.
+
+    Arguments and errors are those of ``advise``; ``grid``: also with more delay, a finer encoder, a slower drive.
+    """
+    from haploop.tools.compare.command import ROWS, find
+
+    with _kept(out, ROWS) as rows:
+        return find(_subject(device, **asked), grid, workers, rows)
+
+
+def _subject(
+    device: str | Path,
+    hand: str | None = None,
+    delay: str | float | None = None,
+    estimator: str | None = None,
+    values: Values = (),
+    plugins: Plugins = (),
+) -> Subject:
+    """Makes the scene that is asked about, and tries its elements out."""
+    from haploop.launch.scene.events import elements_of, try_out
+    from haploop.tools.advise.subject import make_subject
 
     kinds = registry([Path(plugin) for plugin in plugins])
     subject = make_subject(str(device), hand, delay, estimator, texts(values), kinds)
     try_out(elements_of(subject.scene), kinds)
-    with tempfile.TemporaryDirectory(prefix="haploop-") as scratch:
-        directory = Path(scratch if out is None else out)
-        directory.mkdir(parents=True, exist_ok=True)
-        with Trial(Store(directory / WALLS), workers, lambda runs: None) as trial:
-            return advice(subject, trial, lambda stage: None)
+    return subject
+
+
+@contextmanager
+def _kept(out: str | Path | None, name: str) -> Iterator[Path]:
+    """Gives a file in a directory that is made, or in one that is removed afterwards."""
+    with tempfile.TemporaryDirectory(prefix="haploop-") if out is None else nullcontext(out) as directory:
+        Path(directory).mkdir(parents=True, exist_ok=True)
+        yield Path(directory, name)
 
 
 def dissipate(

@@ -16,6 +16,7 @@ ROWS, COMPARISON, FIGURE = "rows.jsonl", "comparison.json", "comparison.png"
 
 if TYPE_CHECKING:
     from haploop.tools.advise.subject import Subject
+    from haploop.tools.compare.comparison import Comparison
 
 
 def compare(
@@ -58,33 +59,38 @@ def compare(
         _compare(subject, grid, workers, out, json)
 
 
-def _compare(subject: Subject, grid: bool, workers: int | None, out: Path | None, as_json: bool) -> None:
-    from haploop.launch.spec import make_output
-    from haploop.logger.summary import finite
+def find(subject: Subject, grid: bool, workers: int | None, rows: Path) -> Comparison:
+    """Compares the stabilizers on a subject's loop, with ``grid`` on others like it; ``rows`` keeps what was found."""
     from haploop.tools.advise.families import FORCE_BOUNDING, applies
     from haploop.tools.advise.walls.cases import make_loop
     from haploop.tools.compare.bench import Effort
     from haploop.tools.compare.comparison import DESCRIBED, Comparison, Kept, compare, variants
     from haploop.tools.compare.conditions import task_words
-    from haploop.tools.compare.figure import draw
-    from haploop.tools.compare.report import comparison_data, report
     from haploop.tools.executor.executors import make_executor
-    from haploop.tools.figure.data import FigureError
     from haploop.tools.render.progress import bars
-    from haploop.tools.render.terminal import console
 
     loop = make_loop(subject.scene, subject.has_task)
-    loops = variants(loop) if grid else {DESCRIBED: loop}
+    loops, effort = variants(loop) if grid else {DESCRIBED: loop}, Effort()
+    with bars() as stage, make_executor(workers) as executor:
+        found = compare(loops, effort, Kept(rows), executor, stage)
+    notes = [*subject.notes, *([] if applies(FORCE_BOUNDING, loop) else [_NO_BOUND])]
+    return Comparison(subject.name, task_words(loop), tuple(notes), effort, found)
+
+
+def _compare(subject: Subject, grid: bool, workers: int | None, out: Path | None, as_json: bool) -> None:
+    from haploop.launch.spec import make_output
+    from haploop.logger.summary import finite
+    from haploop.tools.compare.figure import draw
+    from haploop.tools.compare.report import comparison_data, report
+    from haploop.tools.figure.data import FigureError
+    from haploop.tools.render.terminal import console
+
     goes_on = out is not None and (out / ROWS).exists()
     out = out if out is not None and goes_on else make_output(out, Path(f"compare-{subject.name}"), first=ROWS)
-    effort = Effort()
     try:
-        with bars() as stage, make_executor(workers) as executor:
-            found = compare(loops, effort, Kept(out / ROWS), executor, stage)
+        told = find(subject, grid, workers, out / ROWS)
     except KeyboardInterrupt:
         leave(f"Interrupted; the same command with --out {out} goes on.", FAILED)
-    notes = [*subject.notes, *([] if applies(FORCE_BOUNDING, loop) else [_NO_BOUND])]
-    told = Comparison(subject.name, task_words(loop), tuple(notes), effort, found)
     if not as_json:
         console().print(report(told))
     data = comparison_data(told)
