@@ -144,6 +144,7 @@ def test_what_the_page_draws_are_the_numbers_of_the_log(running, viewing):
             socket.onopen = () => socket.send(JSON.stringify({ type: "watch", span_s: 0.1, points: 2000, end_s: 1.0 }));
             const snapshot = await new Promise(found => socket.onmessage = ({ data }) => {
                 const snapshot = typeof data === "string" ? null : decode(data);
+                if (snapshot) socket.send(JSON.stringify({ type: "drawn" }));
                 // What was logged before the viewer joined comes a moment later than what it hears itself.
                 const filled = snapshot && Object.values(snapshot.tables).every(
                     table => table.columns.every(({ values }) => !values.some(Number.isNaN)));

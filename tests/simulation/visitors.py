@@ -160,6 +160,9 @@ class _Nobody:
     def live(self) -> list[Any]:
         return []
 
+    def past(self) -> list[Any]:
+        return []
+
     def has_launcher(self, run: Any) -> bool:
         return False
 

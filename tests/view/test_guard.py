@@ -25,6 +25,9 @@ class NoRuns:
     def live(self):
         return []
 
+    def past(self):
+        return []
+
     def has_launcher(self, run):
         return False
 

@@ -149,6 +149,9 @@ def test_the_verdict_comes_when_the_launcher_has_judged_the_run_and_until_then_i
         return Finding("steady", "rest", push_N=0.2)
 
     class Launched(LiveRuns):
+        def past(self):
+            return []
+
         def has_launcher(self, run):
             return launcher[0] and super().has_launcher(run)
 

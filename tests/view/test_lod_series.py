@@ -176,3 +176,18 @@ def test_any_amount_may_come_at_once_and_any_gap_may_lie_between(rows_per_tick):
     at = (ticks - first) * rows_per_tick
     padded[at : at + len(rows)] = rows
     np.testing.assert_array_equal(np.sort(pairs), least_and_greatest(padded.reshape(len(pairs), -1)))
+
+
+def test_extremes_of_few_and_of_many_values_are_those_found_one_by_one():
+    """Both ways of computing them, with numbers that are not there and ties, against plain Python."""
+    random = np.random.default_rng(3)
+    for group in (1, 2, 4, 16, 17, 40):
+        values = random.normal(size=(3, 5 * group)).round(1)
+        values[random.random(values.shape) < 0.3] = np.nan
+        pairs = extremes(values, group).reshape(3, 5, 2)
+        for column, row in np.ndindex(3, 5):
+            part = [value for value in values[column, row * group : (row + 1) * group] if value == value]
+            ends = [min(part), max(part)] if part else [np.nan, np.nan]
+            if part and part.index(ends[0]) > part.index(ends[1]):
+                ends.reverse()
+            assert np.array_equal(pairs[column, row], ends, equal_nan=True)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time as wall_clock
 from collections.abc import Sequence
 
 from haploop.logger.log import LogError
 from haploop.protocol.transport.clock_client import Aborted, Refused
+from haploop.protocol.transport.wire import Message
 from haploop.view.receive.ingest import Backfill
+from haploop.view.receive.past_session import PastSession
 from haploop.view.receive.run_session import RunSession
-from haploop.view.receive.runs import Run, Runs
+from haploop.view.receive.runs import CommandFailed, Run, Runs
 
 # Updates a second: telemetry is received and shown so often.
 UPDATE_HZ = 31.5
@@ -20,6 +23,8 @@ _LOOK_S, _IDLE_TURN_S = 0.2, 0.05
 _LOOKS = 10
 # The log is written at least so often: after this time it holds what was received before.
 _LOGGED_S = 0.6
+# Runs to choose from are looked for so often.
+_LIST_S = 2.0
 
 
 class Viewer:
@@ -31,6 +36,7 @@ class Viewer:
 
     Attributes:
         session: the run on show; None before the first.
+        overlay: a recorded run that is drawn behind it; None without.
     """
 
     def __init__(self, runs: Runs, first: str | None, from_start: bool) -> None:
@@ -38,6 +44,9 @@ class Viewer:
         self._known: set[str] = set()
         self._updated = asyncio.Event()
         self.session: RunSession | None = None
+        self.overlay: RunSession | None = None
+        self._followed: RunSession | None = None
+        self._listed: tuple[float, Message] = -math.inf, {}
 
     async def wait_for_update(self) -> None:
         """Waits until what there is to show may have changed."""
@@ -52,7 +61,7 @@ class Viewer:
             session = await self._join(await self._next_run())
             if session is None:
                 continue
-            self.session = session
+            self.session = self._followed = session
             tasks = [asyncio.create_task(session.clock.keep_asking())]
             if self._from_start:
                 tasks.append(asyncio.create_task(self._backfill(session)))
@@ -62,7 +71,44 @@ class Viewer:
                 for task in tasks:
                     task.cancel()
                 await asyncio.to_thread(session.close)
-            await self._complete(session)
+            if not self._first:
+                await self._complete(session)
+
+    def listing(self) -> Message:
+        """Returns the live runs, the recorded ones, and which are on show, looked for now and then."""
+        if wall_clock.monotonic() - self._listed[0] > _LIST_S:
+            named = {
+                kind: [{"id": run.id, "title": run.title} for run in runs]
+                for kind, runs in (("live", self._runs.live()), ("past", self._runs.past()))
+            }
+            self._listed = wall_clock.monotonic(), named
+        shown = {"shown": self.session and self.session.run.id, "overlay": self.overlay and self.overlay.run.id}
+        return {"type": "runs", **self._listed[1], **shown}
+
+    async def open(self, run_id: str) -> str:
+        """Puts a live or a recorded run on show, for all pages; raises CommandFailed where there is none of that id."""
+        if self._followed and self._followed.run.id == run_id:
+            self.session = self._followed
+        elif run_id in [run.id for run in self._runs.live()]:
+            self._known.discard(run_id)
+            self._first = run_id
+        else:
+            self.session = await self._read(run_id)
+        return f"Run {run_id} is shown."
+
+    async def lay_over(self, run_id: str) -> str:
+        """Draws a recorded run behind the one on show, none for ""; raises CommandFailed as ``open`` does."""
+        self.overlay = await self._read(run_id) if run_id else None
+        return f"Run {run_id} is drawn behind." if run_id else "No other run is drawn behind."
+
+    async def _read(self, run_id: str) -> RunSession:
+        run = next((run for run in self._runs.past() if run.id == run_id), None)
+        if run is None:
+            raise CommandFailed(f"There is no run {run_id[:40]!r} to be opened any more.")
+        try:
+            return await asyncio.to_thread(PastSession, run)
+        except (OSError, LogError, ValueError) as error:
+            raise CommandFailed(f"Run {run_id} cannot be read: {error}") from error
 
     async def _next_run(self) -> Run:
         """Waits for the run that was asked for first, or the newest of those that were not there at the last choice."""
@@ -99,7 +145,7 @@ class Viewer:
 
     async def _receive(self, session: RunSession) -> None:
         due = gone_due = wall_clock.monotonic()
-        while not session.outcome:
+        while not session.outcome and not self._first:
             session.poll()
             self._notify_pages()
             now = wall_clock.monotonic()

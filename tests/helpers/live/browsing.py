@@ -6,7 +6,7 @@ import asyncio
 import json
 from collections.abc import AsyncIterator, Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 import aiohttp
@@ -69,6 +69,8 @@ class Tab:
         async for message in self.socket:
             if message.type is aiohttp.WSMsgType.BINARY:
                 self.snapshot, self.snapshots = decode(message.data), self.snapshots + 1
+                with suppress(ConnectionError):
+                    await self.socket.send_json({"type": "drawn"})
                 continue
             told = json.loads(message.data)
             if told["type"] == "answer":

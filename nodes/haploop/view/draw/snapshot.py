@@ -55,14 +55,16 @@ Part = tuple[LodSeries, Mapping[str, Column]]
 IsShown = Callable[[Column, np.ndarray], bool]
 
 
-def snapshot(history: History, viewport: Viewport, changes: Changes | None = None) -> bytes:
+def snapshot(
+    history: History, viewport: Viewport, changes: Changes | None = None, overlay: History | None = None
+) -> bytes:
     """Returns everything a page shows as bytes, packed by :func:`haploop.view.draw.messages.encode`.
 
     Tables over time are position, force and energy; each row by row where the page has room for it, else as an envelope
     whose rows are the two extremes of consecutive buckets in the order in which they came. Then comes an overview of
     the whole run, and what the page's panel asks for: the two phase plots of Choi et al. 2022, row by row, of two
     periods where a swing has a line, else of the last 0.4 s; the energy budget; spectra; the two sides of the last of
-    ``changes``. A table without data is left out.
+    ``changes``. Position and total force of ``overlay``, another run, come beside. A table without data is left out.
     """
     rate = history.time.control_rate
     from_tick, to_tick = _window(history, viewport)
@@ -74,6 +76,7 @@ def snapshot(history: History, viewport: Viewport, changes: Changes | None = Non
         interval = _Interval(first, end, rate, viewport.points)
         tables = [interval.table(*made(history)) for made in (_position, _force, _energy)]
         tables.append(_overview(history, known_from))
+        tables += _laid_over(overlay, from_tick / rate, to_tick / rate, viewport.points) if overlay else []
         if viewport.panel == "loops":
             newest = _newest_periods(history, first, end)
             tables += _force_position(history, newest, end), _momentum(history, newest, end)
@@ -253,6 +256,18 @@ def _overview(history: History, first: int) -> Table | None:
     rate = history.time.control_rate
     columns = [Column("x", "m", "position")]
     return Table("overview", (begins + bucket / 4.0) / rate, bucket / 2.0 / rate, columns, values, envelope=True)
+
+
+def _laid_over(history: History, from_s: float, to_s: float, points: int) -> list[Table | None]:
+    """Returns position and total force of another run in the same interval of its own simulated time."""
+    rate = history.time.control_rate
+    first, end = max(history.first_tick or 0, math.floor(from_s * rate)), min(history.end_tick, math.ceil(to_s * rate))
+    if first >= end:
+        return []
+    interval = _Interval(first, end, rate, points)
+    x, total = {"x": Column("x", "m", "position")}, {"total": Column("total", "N", "total")}
+    parts: list[tuple[str, Part]] = [("position", (history.steps, x)), ("force", (history.ticks, total))]
+    return [interval.table(f"overlay_{name}", [part], lambda *_: True) for name, part in parts]
 
 
 def _spectrum(history: History, first: int, end: int) -> tuple[Table | None, dict[str, Any]]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 from haploop.protocol.changes import Event
+from haploop.protocol.scene.scene import Scene
 from haploop.protocol.transport.sockets import SecureContext
 from haploop.protocol.transport.wire import Message
 
@@ -30,6 +32,11 @@ class Run(Protocol):
         ...
 
     @property
+    def title(self) -> str:
+        """Title of its scene."""
+        ...
+
+    @property
     def clock(self) -> str:
         """Address of the clock."""
         ...
@@ -44,11 +51,37 @@ class Run(Protocol):
         ...
 
 
+class PastRun(Protocol):
+    """A recorded run that is over."""
+
+    id: str
+    out: Path
+    clock: str
+    is_here: bool
+
+    @property
+    def title(self) -> str:
+        """Its name for people."""
+        ...
+
+    def scene(self) -> Scene:
+        """Reads its resolved scene; raises OSError or LogError where there is none."""
+        ...
+
+    def make_context(self) -> SecureContext:
+        """Is not called: nobody is there to connect to."""
+        ...
+
+
 class Runs(Protocol):
     """All runs of this user; implemented by whoever starts a viewer."""
 
     def live(self) -> Sequence[Run]:
         """Returns the runs that live now, the oldest first."""
+        ...
+
+    def past(self) -> Sequence[PastRun]:
+        """Returns recorded runs that may be opened, the newest first."""
         ...
 
     def has_launcher(self, run: Any) -> bool:

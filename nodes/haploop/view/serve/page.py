@@ -1,4 +1,7 @@
-"""The connection of one page: snapshots, state and events go out, its viewport and commands come in."""
+"""The connection of one page: snapshots, state and events go out, its viewport and commands come in.
+
+A snapshot goes out once the page says that it has drawn the last one: a slow or hidden page costs nothing.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,9 @@ _LONGEST_REASON = 120
 _FEWEST_POINTS, _MOST_POINTS = 50, 8000
 _LONGEST_S = 1e9
 # Commands that a page may send; the clock answers more.
-_VERBS = ("pause", "resume", "step", "stop", "swap", "set", "undo", "pace")
+_VERBS = ("pause", "resume", "step", "stop", "swap", "set", "undo", "pace", "open", "overlay")
+# Those of them that change what is shown, and nothing in a run.
+_OF_VIEWER = ("open", "overlay")
 
 
 class Page:
@@ -38,6 +43,8 @@ class Page:
         self._sent_state: tuple[object, ...] | None = ()
         self._sent_events: tuple[object, ...] | None = ()
         self._sent_snapshot: tuple[object, ...] = ()
+        self._has_drawn = True
+        self._sent_listing: Message = {}
 
     async def run(self) -> None:
         """Serves the page until it closes, or sends an invalid message."""
@@ -57,7 +64,10 @@ class Page:
             with contextlib.suppress(asyncio.CancelledError):
                 await showing
 
-    async def _take(self, message: Viewport | Command) -> None:
+    async def _take(self, message: Viewport | Command | None) -> None:
+        if message is None:
+            self._has_drawn = True
+            return
         if isinstance(message, Viewport):
             self._viewport = message
             return
@@ -72,6 +82,11 @@ class Page:
             raise CommandFailed("This page only watches: open the link that haploop view printed to steer.")
         if command.verb not in _VERBS:
             raise CommandFailed(f"{command.verb[:40]!r} is no command; these are: {', '.join(_VERBS)}.")
+        if command.verb in _OF_VIEWER:
+            run_id = command.arguments.get("run")
+            if not isinstance(run_id, str):
+                raise CommandFailed(f"{command.verb} needs the id of a run as text.")
+            return await (self._viewer.open if command.verb == "open" else self._viewer.lay_over)(run_id)
         session = self._viewer.session
         if session is None:
             raise CommandFailed("No run is live; start one with haploop run SCENE.")
@@ -103,14 +118,20 @@ class Page:
         if version != self._sent_state or now >= self._state_due:
             self._sent_state, self._state_due = version, now + _STATE_S
             await self._send(state(session) if session else WAITING)
+            if (listing := self._viewer.listing()) != self._sent_listing:
+                self._sent_listing = listing
+                await self._send(listing)
 
     async def _send_snapshot(self) -> None:
-        if (session := self._viewer.session) is None:
+        if (session := self._viewer.session) is None or not self._has_drawn:
             return
-        showing = (session.history, session.history.version, self._viewport)
+        overlay = self._viewer.overlay
+        showing = (session.history, session.history.version, self._viewport, overlay)
         if showing != self._sent_snapshot:
-            self._sent_snapshot = showing
-            await self._socket.send_bytes(snapshot(session.history, self._viewport, session.changes))
+            self._sent_snapshot, self._has_drawn = showing, False
+            await self._socket.send_bytes(
+                snapshot(session.history, self._viewport, session.changes, overlay and overlay.history)
+            )
 
     async def _send(self, message: Message) -> None:
         await self._socket.send_str(json.dumps(message, allow_nan=False))
@@ -130,8 +151,12 @@ class Command:
     arguments: Message
 
 
-def parse_message(text: str) -> Viewport | Command:
-    """Returns what a text says: ``watch`` as a viewport, ``command`` as a command; raises BadMessage for any other."""
+def parse_message(text: str) -> Viewport | Command | None:
+    """Returns what a text says: ``watch`` as a viewport, ``command`` as a command, ``drawn`` as None.
+
+    Raises:
+        BadMessage: it says anything else.
+    """
     try:
         message = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -139,13 +164,15 @@ def parse_message(text: str) -> Viewport | Command:
     match message:
         case {"type": "watch"}:
             return _watch(message)
+        case {"type": "drawn"}:
+            return None
         case {"type": "command", "id": int(number), "verb": str(verb)}:
             token, arguments = message.get("token"), message.get("arguments", {})
             if isinstance(arguments, dict):
                 return Command(number, token if isinstance(token, str) else "", verb, arguments)
     if isinstance(message, dict) and message.get("type") == "command":
         raise BadMessage("A command must have a whole number as id, a verb, and a table of arguments.")
-    raise BadMessage("A message must be a JSON object whose type is watch or command.")
+    raise BadMessage("A message must be a JSON object whose type is watch, drawn or command.")
 
 
 def _watch(message: Message) -> Viewport:

@@ -9,6 +9,8 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     import asyncio
 
     from haploop.launch.processes.run_directory import LiveRun
+    from haploop.protocol.scene.scene import Scene
+    from haploop.protocol.transport.sockets import SecureContext
     from haploop.protocol.transport.wire import Message
     from haploop.view.serve.guard import Guard
 
@@ -29,6 +33,39 @@ _AT = "The page is at {} ({} ends it)"
 _ENDS = ("Ctrl-C", "closing it")
 # A run waits so long for its viewer.
 _HELD_S = 10.0
+# Recorded runs are looked for here, and so many of them offered.
+_RUNS, _MOST_PAST = "runs", 50
+
+
+@dataclass
+class RecordedRun:
+    """A run that is over, as a viewer finds it."""
+
+    id: str
+    out: Path
+    clock: str = ""
+    is_here: bool = True
+
+    @property
+    def title(self) -> str:
+        return self.id
+
+    def scene(self) -> Scene:
+        """Reads its resolved scene; raises OSError where there is none."""
+        from haploop.launch.runs.run_files import recorded_scene
+        from haploop.launch.scene.mistakes import SceneError
+
+        try:
+            scene = recorded_scene(self.out, {})
+        except SceneError as error:
+            raise OSError(str(error)) from error
+        if scene is None:
+            raise FileNotFoundError(f"There is no scene.toml in {self.out}.")
+        return scene
+
+    def make_context(self) -> SecureContext:
+        """Raises: nobody is there to connect to."""
+        raise OSError(f"Run {self.id} is over.")
 
 
 class LiveRuns:
@@ -42,6 +79,13 @@ class LiveRuns:
         from haploop.launch.processes import run_directory
 
         return [self._only] if self._only else run_directory.live_runs()
+
+    def past(self) -> Sequence[RecordedRun]:
+        """Returns the recorded runs in ./runs that have a summary, the newest first; of a run elsewhere none."""
+        if self._only:
+            return []
+        found = sorted(Path(_RUNS).glob("*/summary.json"), key=lambda file: file.stat().st_mtime, reverse=True)
+        return [RecordedRun(file.parent.name, file.parent) for file in found[:_MOST_PAST]]
 
     def has_launcher(self, run: LiveRun) -> bool:
         """Returns whether the process that started a run is there, which judges it in the end."""

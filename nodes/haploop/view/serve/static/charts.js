@@ -10,7 +10,7 @@ import { TimeChart } from "./time_chart.js";
 const CHARTS = {
   position: { label: "position", unit: "m", prefix: "m", least: 1e-5, zero: false, times: false },
   force: { label: "force", unit: "N", prefix: "", least: 1e-3, zero: true, times: false },
-  energy: { label: "energy taken", unit: "J", prefix: "m", least: 1e-9, zero: true, times: true },
+  energy: { label: "energy", unit: "J", prefix: "m", least: 1e-9, zero: true, times: true },
 };
 const NO_TIMES = new Float64Array(0);
 
@@ -41,6 +41,8 @@ export class Charts {
         wall: name === "position" ? wallOf(lines, state) : null,
         marks,
         note: name === "energy" ? residual(state) : "",
+        envelope: tables[name]?.envelope ?? false,
+        overlay: tables[`overlay_${name}`] ?? null,
       });
     }
     this.panels.show(snapshot, state);

@@ -10,6 +10,8 @@ import { marksOf } from "./marks.js";
 import { showNodes } from "./nodes.js";
 import { onSchemeChange } from "./palette.js";
 import { decode } from "./snapshot.js";
+import { RunChoice } from "./runs.js";
+import { Scrubber } from "./scrubber.js";
 import { SetForm } from "./set_form.js";
 import { allow, obstacle, Steering } from "./steering.js";
 import { Stream } from "./stream.js";
@@ -33,12 +35,14 @@ const viewport = new Viewport(() => {
   charts.refit();
 });
 const charts = new Charts(viewport);
-const stream = new Stream({ connected: onConnection, state: onState, events: onEvents, snapshot: onSnapshot });
+const stream = new Stream({ connected: onConnection, state: onState, events: onEvents, snapshot: onSnapshot, runs: onRuns });
 const steering = new Steering(stream);
 const time = new TimeControls(steering);
 const view = new ViewControls(viewport);
 const swapForm = new SwapForm(steering);
 const setForm = new SetForm(steering);
+const runs = new RunChoice(steering);
+const scrubber = new Scrubber(viewport);
 // The address keeps the token: the jump is made here.
 byId("to-forms").addEventListener("click", (event) => {
   event.preventDefault();
@@ -82,6 +86,10 @@ function showState() {
   allow(phase(), state.why);
 }
 
+function onRuns(listing) {
+  runs.update(listing);
+}
+
 function onEvents(events) {
   marks = marksOf(events);
   showEvents(events, viewport);
@@ -98,11 +106,14 @@ function draw() {
   snapshot = decode(newest);
   newest = null;
   drawn += 1;
+  stream.send({ type: "drawn" }); // the next one is made meanwhile
   redraw();
 }
 
 function redraw() {
-  if (snapshot) charts.show(snapshot, state, marks);
+  if (!snapshot) return;
+  charts.show(snapshot, state, marks);
+  scrubber.show(snapshot, marks);
 }
 
 listen(time, view, () => obstacle(phase()) === "");

@@ -13,7 +13,8 @@ export const maySteer = () => token() !== "";
 
 export class Stream {
   /**
-   * @param {object} handlers what to call: connected(boolean), state(state), events(list), snapshot(buffer).
+   * @param {object} handlers what to call: connected(boolean), state(state), events(list), snapshot(buffer),
+   *   runs(listing).
    */
   constructor(handlers) {
     this.handlers = handlers;
@@ -48,6 +49,7 @@ export class Stream {
   receive(message) {
     if (message.type === "state") this.handlers.state(message);
     else if (message.type === "events") this.handlers.events(message.events);
+    else if (message.type === "runs") this.handlers.runs(message);
     else if (message.type === "answer") {
       this.waiting.get(message.id)?.(message);
       this.waiting.delete(message.id);

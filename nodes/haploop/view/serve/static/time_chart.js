@@ -7,12 +7,14 @@ import { Legend, stroke } from "./legend.js";
 import { drawMarks } from "./marks.js";
 import { ClimbingUnit } from "./climbing.js";
 import { colour } from "./palette.js";
-import { halfPlane, line as linePath } from "./paths.js";
-import { last, scaled } from "./snapshot.js";
+import { band, halfPlane, line as linePath } from "./paths.js";
+import { last, scaled, times } from "./snapshot.js";
 import { extent, Range } from "./range.js";
 
 const CURSORS = "haploop";
 const DECIMALS = 3;
+// A band is filled so faintly that those behind it are seen.
+const BAND = 45;
 
 export class TimeChart {
   /**
@@ -28,6 +30,8 @@ export class TimeChart {
     this.legend = new Legend(host, () => this.retoggle());
     this.plot = host.appendChild(make("div", { class: "plot" }));
     this.lines = [];
+    this.envelope = false;
+    this.overlay = null;
     this.columns = [];
     this.t = new Float64Array(0);
     this.span = [0, 1];
@@ -45,11 +49,12 @@ export class TimeChart {
       label: name,
       stroke: stroke(line),
       width: line.width,
-      dash: line.dash,
+      dash: this.envelope ? [] : line.dash,
+      fill: this.envelope ? stroke(line, BAND) : undefined,
       show: this.legend.isShown(key),
       auto: false,
       points: { show: false },
-      paths: (u, i) => ({ stroke: linePath(u, u.data[0], u.data[i]) }),
+      paths: (u, i) => (this.envelope ? band(u, u.data[0], u.data[i]) : { stroke: linePath(u, u.data[0], u.data[i]) }),
     }));
     const options = {
       ...this.size(),
@@ -70,7 +75,7 @@ export class TimeChart {
       },
       hooks: {
         drawClear: [(u) => this.shade(u)],
-        draw: [(u) => drawMarks(u, this.marks)],
+        draw: [(u) => this.layOver(u), (u) => drawMarks(u, this.marks)],
         setCursor: [() => this.tell()],
         setSelect: [(u) => this.select(u)],
       },
@@ -85,15 +90,17 @@ export class TimeChart {
    * @param {[number, number]} span first and last time, s.
    * @param {Float64Array} t times of the numbers, s.
    * @param {{key: string, label: string, line: object, values: ArrayLike<number>}[]} lines
-   * @param {object} more wall: {values, side} to shade, or null; marks; note for the end of the legend.
+   * @param {object} more wall: {values, side} to shade, or null; marks; note for the end of the legend;
+   *   envelope: whether each two rows are the extremes of one interval; overlay: the table of another run, or null.
    */
-  show(span, t, lines, { wall = null, marks = [], note = "" } = {}) {
+  show(span, t, lines, { wall = null, marks = [], note = "", envelope = false, overlay = null } = {}) {
     const signature = (list) => JSON.stringify(list.map(({ key, label }) => [key, label]));
-    const isNew = signature(lines) !== signature(this.lines) | this.climb(lines);
+    const isNew = signature(lines) !== signature(this.lines) || envelope !== this.envelope;
+    const climbs = this.climb(lines);
     const columns = lines.map(({ values }) => scaled(values, this.unit.factor));
-    Object.assign(this, { span, t, lines, wall, marks, note, columns });
+    Object.assign(this, { span, t, lines, wall, marks, note, envelope, overlay, columns });
     this.rerange();
-    if (isNew) {
+    if (isNew || climbs) {
       this.legend.name(lines);
       this.build();
     }
@@ -110,6 +117,7 @@ export class TimeChart {
 
   rerange() {
     const shown = this.columns.filter((_, i) => this.legend.isShown(this.lines[i].key));
+    if (this.overlay) shown.push(scaled(this.overlay.columns[0].values, this.unit.factor));
     this.range.follow(...extent(shown, this.options.zero && shown.length ? [0] : []));
   }
 
@@ -134,6 +142,20 @@ export class TimeChart {
     u.ctx.clip();
     u.ctx.fillStyle = colour("wall-fill");
     u.ctx.fill(halfPlane(u, this.t, scaled(this.wall.values, this.unit.factor), this.wall.side));
+    u.ctx.restore();
+  }
+
+  /** The same quantity of another run, faintly. */
+  layOver(u) {
+    if (!this.overlay) return;
+    const values = scaled(this.overlay.columns[0].values, this.unit.factor);
+    u.ctx.save();
+    u.ctx.beginPath();
+    u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
+    u.ctx.clip();
+    u.ctx.strokeStyle = colour("mark");
+    u.ctx.lineWidth = devicePixelRatio;
+    u.ctx.stroke(linePath(u, times(this.overlay), values));
     u.ctx.restore();
   }
 

@@ -1,0 +1,44 @@
+// The runs there are: live ones and those that were recorded. One is on show, another may be drawn behind it.
+
+import { byId, make } from "./dom.js";
+
+export class RunChoice {
+  /** @param {import("./steering.js").Steering} steering carries the choice: it is that of all pages of this viewer. */
+  constructor(steering) {
+    this.known = "";
+    byId("run").addEventListener("change", () => this.choose(steering, "open", byId("run")));
+    byId("overlay").addEventListener("change", () => this.choose(steering, "overlay", byId("overlay")));
+  }
+
+  async choose(steering, verb, select) {
+    const { ok } = await steering.order(verb, { run: select.value });
+    if (!ok) this.mark();
+  }
+
+  /** Follow what the viewer lists. */
+  update(listing) {
+    this.listing = listing;
+    const { live, past } = listing;
+    const known = JSON.stringify([live, past]);
+    if (known !== this.known) {
+      this.known = known;
+      byId("run").replaceChildren(group(`live (${live.length})`, live), group("recorded, in runs/", past));
+      byId("overlay").replaceChildren(make("option", { value: "" }, "no other run"), ...past.map(option));
+      byId("runs").hidden = live.length + past.length === 0;
+    }
+    this.mark();
+  }
+
+  mark() {
+    const { shown, overlay } = this.listing;
+    if (document.activeElement !== byId("run")) byId("run").value = shown ?? "";
+    if (document.activeElement !== byId("overlay")) byId("overlay").value = overlay ?? "";
+    const others = this.listing.live.filter(({ id }) => id !== shown).length;
+    byId("others").hidden = others === 0;
+    byId("others").textContent = others === 1 ? "1 other run is live" : `${others} other runs are live`;
+  }
+}
+
+const option = ({ id, title }) => make("option", { value: id }, title === id ? id : `${id}: ${title}`);
+
+const group = (label, runs) => make("optgroup", { label }, ...runs.map(option));

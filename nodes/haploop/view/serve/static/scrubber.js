@@ -1,0 +1,60 @@
+// The whole run as a strip: its position, what changed it, and which part the charts show; dragging shows another.
+
+import { byId, put } from "./dom.js";
+import { colour } from "./palette.js";
+import { extent } from "./range.js";
+
+const HEIGHT = 30;
+const STEPS = 1000;
+
+export class Scrubber {
+  /** @param {import("./viewport.js").Viewport} viewport what dragging changes. */
+  constructor(viewport) {
+    this.viewport = viewport;
+    this.canvas = byId("overview");
+    this.input = byId("scrub");
+    Object.assign(this.input, { min: "0", max: String(STEPS), step: "1" });
+    this.input.addEventListener("input", () => this.move(Number(this.input.value) / STEPS));
+  }
+
+  /** Show the part that ends at this share of the run; at its end, what comes. */
+  move(share) {
+    const { first_s: first, last_s: last, shown } = this.viewport;
+    const span = this.viewport.span_s ?? shown[1] - shown[0];
+    const end = first + share * (last - first);
+    if (share >= 1) this.viewport.live();
+    else this.viewport.at(end - span, end);
+  }
+
+  show({ from_s: from, to_s: to, tables: { overview } }, marks) {
+    const ratio = devicePixelRatio;
+    const width = Math.round(this.canvas.clientWidth * ratio);
+    const height = HEIGHT * ratio;
+    if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
+    const ctx = this.canvas.getContext("2d");
+    ctx.clearRect(0, 0, width, height);
+    const { first_s: first, last_s: last } = this.viewport;
+    if (!overview || !(last > first)) return;
+    const across = (t) => ((t - first) / (last - first)) * width;
+    ctx.fillStyle = colour("grid");
+    ctx.fillRect(across(from), 0, Math.max(2 * ratio, across(to) - across(from)), height);
+    this.line(ctx, overview, across, height);
+    ctx.fillStyle = colour("mark");
+    for (const { t_s, changes } of marks) if (changes) ctx.fillRect(Math.round(across(t_s)), 0, ratio, height);
+    if (document.activeElement !== this.input) this.input.value = String(Math.round((STEPS * (Math.min(to, last) - first)) / (last - first)));
+    this.input.setAttribute("aria-valuetext", `${from.toFixed(2)} to ${Math.min(to, last).toFixed(2)} s`);
+    put(byId("scrub-ends"), `${first.toFixed(1)}–${last.toFixed(1)} s`);
+  }
+
+  line(ctx, { t0_s: t0, dt_s: dt, columns: [{ values }] }, across, height) {
+    const [low, high] = extent([values]);
+    ctx.strokeStyle = colour("grey");
+    ctx.lineWidth = devicePixelRatio;
+    ctx.beginPath();
+    values.forEach((value, i) => {
+      if (value - value !== 0) return;
+      ctx.lineTo(across(t0 + i * dt), height * (0.1 + 0.8 * (high > low ? (high - value) / (high - low) : 0.5)));
+    });
+    ctx.stroke();
+  }
+}

@@ -1,0 +1,73 @@
+"""Recorded runs on the page: found, opened, drawn over another, and refused by a sentence where they are not there."""
+
+import numpy as np
+import pytest
+
+from haploop.launch import load, run
+from haploop.tools.cli.view import LiveRuns
+from haploop.view.draw.messages import state
+from haploop.view.draw.snapshot import Viewport, snapshot
+from haploop.view.receive.past_session import PastSession
+from haploop.view.receive.runs import CommandFailed
+from haploop.view.viewer import Viewer
+from helpers.live.browsing import decode, to_its_end
+
+
+@pytest.fixture
+def recorded(tmp_path, monkeypatch):
+    """Two recorded runs in ./runs, the second of a softer wall and with a swap; what came of the second."""
+    monkeypatch.chdir(tmp_path)
+    scene = load("fig6c").set({"duration": 1.5})
+    run(scene, out="runs/first")
+    return run(scene.set({"wall.stiffness": 100.0}).swap("damping", at="1.2 s", damping=0.8), out="runs/second")
+
+
+def test_a_recorded_run_is_opened_with_its_numbers_events_and_verdict(recorded):
+    found = {past.id: past for past in LiveRuns().past()}
+    assert found.keys() == {"first", "second"}
+    session = PastSession(found["second"])
+    told = state(session)
+    assert (told["phase"], told["run"], told["tick"]) == ("ended", "second", 1500)
+    assert told["summary"]["trajectory_sha256"] == recorded.summary["trajectory_sha256"]
+    assert told["verdict"] == recorded.summary["verdict"]
+    assert [tick for tick, event in session.events if "swap" in event] == [1200]
+    shown = decode(snapshot(session.history, Viewport(0.2, 2000, 1.0), session.changes))
+    x = shown["tables"]["position"]["values"]["x"]
+    assert np.array_equal(x, recorded["/plant"]["x"][8000:10000].astype(np.float32))
+
+
+def test_a_viewer_shows_one_recorded_run_and_draws_another_over_it(recorded):
+    async def play():
+        viewer = Viewer(LiveRuns(), None, from_start=True)
+        assert [past["id"] for past in viewer.listing()["past"]] == ["second", "first"]
+        await viewer.open("second")
+        await viewer.lay_over("first")
+        assert (viewer.listing()["shown"], viewer.listing()["overlay"]) == ("second", "first")
+        for wrong in ("", "third", "../first", "/etc"):
+            with pytest.raises(CommandFailed, match="no run"):
+                await viewer.open(wrong)
+        return viewer.session, viewer.overlay
+
+    session, overlay = to_its_end(play())
+    assert session
+    assert overlay
+    tables = decode(snapshot(session.history, Viewport(0.2, 2000, 1.2), None, overlay.history))["tables"]
+    own, other = (tables[name]["values"]["x"] for name in ("position", "overlay_position"))
+    assert own.shape == other.shape
+    assert not np.array_equal(own, other), "the walls are not alike"
+    late = decode(snapshot(session.history, Viewport(0.2, 2000, None), None, None))["tables"]
+    assert "overlay_position" not in late
+
+
+def test_what_cannot_be_read_is_refused_and_what_was_shown_stays(recorded, tmp_path):
+    (tmp_path / "runs/first/scene.toml").write_text("device = 3")
+    (tmp_path / "runs/second/log.mcap").unlink()
+
+    async def play():
+        viewer = Viewer(LiveRuns(), None, from_start=True)
+        for broken in ("first", "second"):
+            with pytest.raises(CommandFailed, match="cannot be read"):
+                await viewer.open(broken)
+        return viewer.session
+
+    assert to_its_end(play()) is None
