@@ -160,6 +160,9 @@ class _Nobody:
     def live(self) -> list[Any]:
         return []
 
+    def stiffness_limit(self, scene: Any) -> float | None:
+        return None
+
     def past(self) -> list[Any]:
         return []
 

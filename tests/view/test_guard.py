@@ -25,6 +25,9 @@ class NoRuns:
     def live(self):
         return []
 
+    def stiffness_limit(self, scene):
+        return None
+
     def past(self):
         return []
 

@@ -77,7 +77,7 @@ class Tab:
                 self._answers[told["id"]] = told
             elif told["type"] == "events":
                 self.events = told["events"]
-            else:
+            elif told["type"] == "state":
                 self.state = told
         self.closed = self.socket.close_code, reason
 

@@ -124,6 +124,7 @@ def state(session: RunSession) -> Message:
             **({"kind": wall.kind} if wall.kind else {}),
         },
         "delay_s": session.delay_s,
+        "limit_N_m": session.clock.limit_N_m,
         "summary": summary,
         "sight": sight and dataclasses.asdict(sight),
     }

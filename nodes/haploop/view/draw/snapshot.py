@@ -23,6 +23,8 @@ _ROWS_A_POINT, _BUCKETS_A_POINT = 3.0, 0.75
 # Phase plots show so many periods of a swing, which is looked for in so much time, or all of that time; rows at most.
 _PERIODS, _PHASE_S, _MOST_ROWS = 2.0, 0.4, 8000
 PANELS = ("loops", "energy", "spectrum", "compare", "motion")
+# Simulated time of the samples that are heard at once.
+_SOUND_S = 0.25
 # Ticks of which a spectrum is made at most, the newest; parts of an overview of the run.
 _SPECTRUM_TICKS, _OVERVIEW_PARTS = 2048, 256
 # Points of the curve of a wall that is no spring.
@@ -41,12 +43,14 @@ class Viewport:
         points: about how many points fit side by side.
         end_s: end of the interval, s; None for the newest tick.
         panel: what is shown beside the charts over time, of ``PANELS``.
+        sound: whether the newest samples of the force are wanted, to be heard.
     """
 
     span_s: float | None = 2.0
     points: int = 1000
     end_s: float | None = None
     panel: str = PANELS[0]
+    sound: bool = False
 
 
 # Columns of one series by name, each with its header entry.
@@ -77,6 +81,8 @@ def snapshot(
         tables = [interval.table(*made(history)) for made in (_position, _force, _energy)]
         tables.append(_overview(history, known_from))
         tables += _laid_over(overlay, from_tick / rate, to_tick / rate, viewport.points) if overlay else []
+        if viewport.sound:
+            tables.append(_sound(history))
         if viewport.panel == "loops":
             newest = _newest_periods(history, first, end)
             tables += _force_position(history, newest, end), _momentum(history, newest, end)
@@ -256,6 +262,17 @@ def _overview(history: History, first: int) -> Table | None:
     rate = history.time.control_rate
     columns = [Column("x", "m", "position")]
     return Table("overview", (begins + bucket / 4.0) / rate, bucket / 2.0 / rate, columns, values, envelope=True)
+
+
+def _sound(history: History) -> Table | None:
+    """Returns the newest samples of the applied force, at plant steps."""
+    end = history.steps.end_tick
+    first = max(history.steps.full_from_tick, end - round(_SOUND_S * history.time.control_rate))
+    if first >= end:
+        return None
+    force = history.steps.rows(["force"], first, end)
+    time = history.time
+    return Table("sound", first / time.control_rate, 1.0 / time.plant_rate, [Column("force", "N", "force")], force)
 
 
 def _laid_over(history: History, from_s: float, to_s: float, points: int) -> list[Table | None]:

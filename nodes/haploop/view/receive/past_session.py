@@ -20,6 +20,7 @@ class _NoClock:
     def __init__(self) -> None:
         self.status: Message = {}
         self.options: Message | None = None
+        self.limit_N_m: float | None = None
 
 
 class PastSession(RunSession):

@@ -60,7 +60,7 @@ class RunSession:
         self.status: Message = {}
         self.events: list[tuple[int, Event]] = []
         self.changes = Changes(self.scene.encoder.resolution if self.scene.encoder else 0.0)
-        self.clock = ClockAnswers(runs, run, self.events)
+        self.clock = ClockAnswers(runs, run, self.events, self.scene)
         self.delay_s = self.scene.clock.round_trip_delay
         self.outcome = self.why = ""
         self.given_up = False

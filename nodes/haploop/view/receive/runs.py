@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from haploop.protocol.changes import Event
+from haploop.protocol.changes import Event, at_work, changes_of
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.transport.sockets import SecureContext
 from haploop.protocol.transport.wire import Message
@@ -84,6 +84,10 @@ class Runs(Protocol):
         """Returns recorded runs that may be opened, the newest first."""
         ...
 
+    def stiffness_limit(self, scene: Scene) -> float | None:
+        """Returns the largest wall stiffness at which a loop stays stable, N/m, of its linear map; None for none."""
+        ...
+
     def has_launcher(self, run: Any) -> bool:
         """Returns whether the launcher of a run is there; it judges the run after the processes have ended."""
         ...
@@ -99,10 +103,12 @@ class ClockAnswers:
     Attributes:
         status: the answer to ``status``, {} before the first.
         options: what can be changed; None before the first answer.
+        limit_N_m: the largest stiffness that its wall may have in the loop as it is; None where there is no limit.
     """
 
-    def __init__(self, runs: Runs, run: Run, events: Sequence[tuple[int, Event]]) -> None:
-        self._runs, self._run, self._events = runs, run, events
+    def __init__(self, runs: Runs, run: Run, events: Sequence[tuple[int, Event]], scene: Scene) -> None:
+        self._runs, self._run, self._events, self._scene = runs, run, events, scene
+        self.limit_N_m: float | None = None
         self._ask_now = asyncio.Event()
         self.status: Message = {}
         self.options: Message | None = None
@@ -120,6 +126,8 @@ class ClockAnswers:
                 if changes != seen:
                     _, self.options = await self._ask("options", {})
                     seen = changes
+                    now = at_work(self._scene, changes_of(self._events))
+                    self.limit_N_m = await asyncio.to_thread(self._runs.stiffness_limit, now)
             self._ask_now.clear()
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._ask_now.wait(), _ASK_S)

@@ -185,7 +185,9 @@ def _watch(message: Message) -> Viewport:
     panel = message.get("panel", PANELS[0])
     if panel not in PANELS:
         raise BadMessage(f"watch.panel must be one of {', '.join(PANELS)}.")
-    return Viewport(span_s, int(min(max(points, _FEWEST_POINTS), _MOST_POINTS)), end_s, panel)
+    return Viewport(
+        span_s, int(min(max(points, _FEWEST_POINTS), _MOST_POINTS)), end_s, panel, message.get("sound") is True
+    )
 
 
 def _seconds(value: object, key: str) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import subprocess
 import sys
@@ -86,6 +87,16 @@ class LiveRuns:
             return []
         found = sorted(Path(_RUNS).glob("*/summary.json"), key=lambda file: file.stat().st_mtime, reverse=True)
         return [RecordedRun(file.parent.name, file.parent) for file in found[:_MOST_PAST]]
+
+    def stiffness_limit(self, scene: Scene) -> float | None:
+        """Returns the largest stiffness with which the linear map of a loop is stable, N/m; None where it has none."""
+        from haploop.tools.linear.one_tick import OneTickMap
+
+        try:
+            limit = OneTickMap.from_scene(scene).stiffness_limit()
+        except (ValueError, KeyError, ArithmeticError):  # no linear loop, none stable, or an element not installed
+            return None
+        return limit if math.isfinite(limit) else None
 
     def has_launcher(self, run: LiveRun) -> bool:
         """Returns whether the process that started a run is there, which judges it in the end."""

@@ -26,6 +26,7 @@ export class ComparePanel {
     this.about = make("p", { class: "about" });
     this.sides = make("p", { class: "sides", "aria-hidden": "true" }, ...SIDES.map((side) => make("span", {}, side)));
     host.append(this.title, this.about, this.sides, ...this.pictures, this.table);
+    this.show({ tables: {} });
   }
 
   show({ change, tables }) {

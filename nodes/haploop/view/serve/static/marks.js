@@ -62,3 +62,13 @@ function drawLabel(ctx, text, x, { left, top, width }, free, ratio) {
   ctx.fillStyle = ctx.strokeStyle;
   ctx.fillText(text, start + GAP_PX * ratio, y + 2 * ratio);
 }
+
+/** Draw the times between which is measured. */
+export function drawMeasured(u, measured) {
+  const { left, top, width, height } = u.bbox;
+  u.ctx.fillStyle = colour("accent");
+  for (const t of measured) {
+    const x = Math.round(u.valToPos(t, "x", true));
+    if (x >= left && x <= left + width) u.ctx.fillRect(x, top, devicePixelRatio, height);
+  }
+}

@@ -11,7 +11,9 @@ import { showNodes } from "./nodes.js";
 import { onSchemeChange } from "./palette.js";
 import { decode } from "./snapshot.js";
 import { RunChoice } from "./runs.js";
+import { saveData, savePicture } from "./save.js";
 import { Scrubber } from "./scrubber.js";
+import { Sound } from "./sound.js";
 import { SetForm } from "./set_form.js";
 import { allow, obstacle, Steering } from "./steering.js";
 import { Stream } from "./stream.js";
@@ -33,6 +35,7 @@ const viewport = new Viewport(() => {
   stream.watch(viewport.request());
   view.update();
   charts.refit();
+  redraw();
 });
 const charts = new Charts(viewport);
 const stream = new Stream({ connected: onConnection, state: onState, events: onEvents, snapshot: onSnapshot, runs: onRuns });
@@ -43,6 +46,9 @@ const swapForm = new SwapForm(steering);
 const setForm = new SetForm(steering);
 const runs = new RunChoice(steering);
 const scrubber = new Scrubber(viewport);
+const sound = new Sound(viewport);
+byId("save-picture").addEventListener("click", () => savePicture(state));
+byId("save-data").addEventListener("click", () => snapshot && saveData(snapshot, state));
 // The address keeps the token: the jump is made here.
 byId("to-forms").addEventListener("click", (event) => {
   event.preventDefault();
@@ -81,7 +87,7 @@ function showState() {
   byId("nothing-yet").hidden = goesOn || Boolean(state.summary);
   if (state.options) {
     swapForm.update(state.options);
-    setForm.update(state.options);
+    setForm.update(state.options, state.limit_N_m);
   }
   allow(phase(), state.why);
 }
@@ -114,6 +120,7 @@ function redraw() {
   if (!snapshot) return;
   charts.show(snapshot, state, marks);
   scrubber.show(snapshot, marks);
+  sound.play(snapshot, state);
 }
 
 listen(time, view, () => obstacle(phase()) === "");

@@ -4,7 +4,7 @@ import { byId, put } from "./dom.js";
 import { colour } from "./palette.js";
 import { extent } from "./range.js";
 
-const HEIGHT = 30;
+const HEIGHT = 24;
 const STEPS = 1000;
 
 export class Scrubber {
@@ -34,11 +34,11 @@ export class Scrubber {
     const ctx = this.canvas.getContext("2d");
     ctx.clearRect(0, 0, width, height);
     const { first_s: first, last_s: last } = this.viewport;
-    if (!overview || !(last > first)) return;
+    if (!(last > first)) return;
     const across = (t) => ((t - first) / (last - first)) * width;
     ctx.fillStyle = colour("grid");
     ctx.fillRect(across(from), 0, Math.max(2 * ratio, across(to) - across(from)), height);
-    this.line(ctx, overview, across, height);
+    if (overview) this.line(ctx, overview, across, height);
     ctx.fillStyle = colour("mark");
     for (const { t_s, changes } of marks) if (changes) ctx.fillRect(Math.round(across(t_s)), 0, ratio, height);
     if (document.activeElement !== this.input) this.input.value = String(Math.round((STEPS * (Math.min(to, last) - first)) / (last - first)));

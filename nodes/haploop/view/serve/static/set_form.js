@@ -2,12 +2,16 @@
 
 import { byId, put } from "./dom.js";
 import { Field, firstWrong, refuse } from "./field.js";
+import { Slider } from "./slider.js";
+
+const STIFFNESS = "wall.stiffness";
 
 export class SetForm {
   /** @param {import("./steering.js").Steering} steering carries the order. */
   constructor(steering) {
     this.steering = steering;
     this.fields = [];
+    this.sliders = [];
     this.known = "";
     const form = byId("set");
     form.addEventListener("input", () => this.note());
@@ -22,13 +26,14 @@ export class SetForm {
   }
 
   /** Follow the run: the keys that can be set and their present values. What is being typed stays. */
-  update({ settable }) {
+  update({ settable }, limit_N_m = null) {
     const known = JSON.stringify(Object.entries(settable).map(([key, { value, ...quantity }]) => [key, quantity]));
     if (known !== this.known) {
       this.known = known;
       this.rebuild(settable);
     }
     for (const field of this.fields) field.show(settable[field.name].value);
+    for (const slider of this.sliders) slider.show(settable[slider.field.name].value, slider.field.name === STIFFNESS ? limit_N_m : null);
     this.note();
   }
 
@@ -36,6 +41,7 @@ export class SetForm {
     const typed = new Map(this.changed().map((field) => [field.name, field.input.value]));
     const focused = this.fields.find(({ input }) => input === document.activeElement)?.name;
     this.fields = Object.entries(settable).map(([key, quantity]) => new Field(`set-${key}`, key, quantity));
+    this.sliders = this.fields.filter(({ quantity }) => quantity.unit !== "s").map((field) => new Slider(field, () => this.set()));
     byId("set-fields").replaceChildren(...this.fields.map(({ element }) => element));
     for (const field of this.fields) {
       field.show(settable[field.name].value);

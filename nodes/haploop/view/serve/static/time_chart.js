@@ -1,10 +1,10 @@
 // A chart over simulated time: lines of one unit, the events that changed the run, a cursor shared with its neighbours.
 
-import { steady } from "./amounts.js";
+import { amount, steady } from "./amounts.js";
 import { bareAxis, bottomAxis, leftAxis } from "./axes.js";
 import { make } from "./dom.js";
 import { Legend, stroke } from "./legend.js";
-import { drawMarks } from "./marks.js";
+import { drawMarks, drawMeasured } from "./marks.js";
 import { ClimbingUnit } from "./climbing.js";
 import { colour } from "./palette.js";
 import { band, halfPlane, line as linePath } from "./paths.js";
@@ -75,12 +75,13 @@ export class TimeChart {
       },
       hooks: {
         drawClear: [(u) => this.shade(u)],
-        draw: [(u) => this.layOver(u), (u) => drawMarks(u, this.marks)],
+        draw: [(u) => this.layOver(u), (u) => drawMarks(u, this.marks), (u) => drawMeasured(u, this.viewport.measured)],
         setCursor: [() => this.tell()],
         setSelect: [(u) => this.select(u)],
       },
     };
     this.u = new uPlot(options, [this.t, ...this.columns], this.plot);
+    this.u.over.addEventListener("click", () => this.viewport.mark(this.u.posToVal(this.u.cursor.left, "x")));
     this.draw();
   }
 
@@ -162,10 +163,19 @@ export class TimeChart {
   /** The numbers under the cursor, or the last ones. */
   tell() {
     if (!this.u) return;
-    const at = this.u.cursor.idx;
+    const [begin, end] = this.viewport.measured;
+    const at = end === undefined ? this.u.cursor.idx : this.u.valToIdx(end);
+    if (begin !== undefined && at != null) return this.measure(this.u.valToIdx(begin), at);
     const texts = this.columns.map((values) => steady(at == null ? last(values) : values[at], DECIMALS));
     const time = at == null ? "" : `at ${steady(this.t[at], 4)} s`;
-    this.legend.tell(texts, time || this.note);
+    return this.legend.tell(texts, time || this.note);
+  }
+
+  /** The differences between two rows. */
+  measure(from, to) {
+    const texts = this.columns.map((values) => `Δ ${steady(values[to] - values[from], DECIMALS)}`);
+    const time = this.t[to] - this.t[from];
+    this.legend.tell(texts, `Δ ${steady(time, 4)} s${time ? `, ${amount(Math.abs(1 / time), "Hz")}` : ""}`);
   }
 
   select(u) {

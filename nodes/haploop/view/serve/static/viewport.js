@@ -13,6 +13,9 @@ export class Viewport {
     this.end_s = null;
     this.points = 1000;
     this.panel = "loops";
+    this.sound = false;
+    // Times between which the charts measure: none, one (to the cursor) or two.
+    this.measured = [];
     // What there is to look at, and what is on the page now.
     this.first_s = 0;
     this.last_s = 0;
@@ -25,7 +28,7 @@ export class Viewport {
 
   /** As the server wants to be asked. */
   request() {
-    return { span_s: this.span_s, points: this.points, end_s: this.end_s, panel: this.panel };
+    return { span_s: this.span_s, points: this.points, end_s: this.end_s, panel: this.panel, sound: this.sound };
   }
 
   /** So many seconds, or null for everything since the start. */
@@ -52,6 +55,7 @@ export class Viewport {
   }
 
   live() {
+    this.measured = [];
     if (!this.frozen) return;
     this.end_s = null;
     if (!SPANS_S.includes(this.span_s)) this.span_s = 2;
@@ -75,6 +79,18 @@ export class Viewport {
 
   within(end_s) {
     return Math.max(Math.min(end_s, this.last_s), Math.min(this.first_s + this.span_s, this.last_s));
+  }
+
+  /** Whether the samples of the force are wanted, to be heard. */
+  listen(on) {
+    this.sound = on;
+    this.changed();
+  }
+
+  /** Measure from here, then to here; a third time, no more. */
+  mark(t_s) {
+    this.measured = this.measured.length < 2 ? [...this.measured, t_s] : [];
+    this.changed();
   }
 
   /** What is shown beside the charts over time. */

@@ -1,0 +1,39 @@
+// A slider beside a number above zero: from a tenth to ten times of it, the part beyond the loop's limit shaded.
+
+import { amount, plain } from "./amounts.js";
+import { make } from "./dom.js";
+
+const STEPS = 200;
+const DIGITS = 3;
+
+export class Slider {
+  /**
+   * @param {import("./field.js").Field} field whose number it moves.
+   * @param {() => void} released called when a new number has been chosen.
+   */
+  constructor(field, released) {
+    this.field = field;
+    this.centre = 0;
+    this.limit = null;
+    this.input = make("input", { type: "range", min: String(-STEPS), max: String(STEPS), "aria-label": `${field.name}, coarse` });
+    this.input.addEventListener("input", () => {
+      field.input.value = plain(Number((this.centre * field.factor * 10 ** (Number(this.input.value) / STEPS)).toPrecision(DIGITS)));
+      field.input.dispatchEvent(new Event("input", { bubbles: true }));
+    });
+    this.input.addEventListener("change", released);
+    field.element.append(this.input);
+  }
+
+  /** The number as it is, and the limit it has, in SI; no slider for a number that is not above zero. */
+  show(value, limit = null) {
+    this.input.hidden = !(value > 0);
+    if (this.input.hidden) return;
+    if (!this.field.touched && (this.centre === 0 || Math.abs(Math.log10(value / this.centre)) > 0.7)) this.centre = value;
+    if (!this.field.touched && document.activeElement !== this.input) this.input.value = String(Math.round(STEPS * Math.log10(value / this.centre)));
+    if (limit === this.limit && this.shadedFor === this.centre) return;
+    Object.assign(this, { limit, shadedFor: this.centre });
+    const share = limit ? 50 + 50 * Math.log10(limit / this.centre) : 100;
+    this.input.style.setProperty("--safe", `${Math.min(100, Math.max(0, share))}%`);
+    this.input.title = limit ? `Beyond ${amount(limit, this.field.quantity.unit)} the loop as it is now, without quantisation and noise, is unstable.` : "";
+  }
+}

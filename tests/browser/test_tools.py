@@ -1,0 +1,134 @@
+"""Tools of the page: panels beside the charts, cursors that measure, files that are saved, runs to choose, sliders."""
+
+import json
+import re
+
+import pytest
+from playwright.sync_api import expect
+
+from helpers.live.browser import order
+from helpers.live.stand_in import OPTIONS, RUNNING
+from oracles.snapshots import contact, snapshot, table
+
+pytestmark = pytest.mark.slow
+ROWS = [("hand", -2e-3), ("delay", -1e-3), ("damping", 2.5e-3), ("put into store", 5e-4)]
+RUNS = {
+    "type": "runs", "live": [{"id": "abc123", "title": "one"}, {"id": "def456", "title": "two"}],
+    "past": [{"id": "wall-1", "title": "wall-1"}], "shown": "abc123", "overlay": None,
+}  # fmt: skip
+
+
+def with_header(data: bytes, **more) -> bytes:
+    """A snapshot with more entries in its header."""
+    length = int.from_bytes(data[:4], "little")
+    head = json.dumps(json.loads(data[4 : 4 + length]) | more).encode()
+    head += b" " * (-(4 + len(head)) % 8)
+    return len(head).to_bytes(4, "little") + head + data[4 + length :]
+
+
+def test_bars_of_energy_lie_left_of_zero_where_they_feed_and_right_where_they_take(stand_in, page):
+    rows = [{"name": name, "total_J": joules, "window_J": joules / 4} for name, joules in ROWS]
+    page.click("[data-panel=energy]")
+    stand_in.asked(lambda watch: watch["panel"] == "energy")
+    stand_in.show(with_header(contact(), budget={"from_s": 1.0, "to_s": 3.0, "about_s": 0.0, "rows": rows}))
+    expect(page.locator("#budget output")).to_have_text(["−2.00 mJ", "−1.00 mJ", "2.50 mJ", "500 µJ"])
+    zero = page.locator("#budget b").bounding_box()
+    for (name, joules), bar in zip(ROWS, page.locator("#budget .bar").all(), strict=True):
+        box, track = bar.bounding_box(), bar.locator("..").bounding_box()
+        middle = track["x"] + track["width"] / 2
+        assert abs(zero["x"] + zero["width"] / 2 - middle) < 3, "the 0 stands where the bars begin"
+        assert (box["x"] + box["width"] / 2 < middle) == (joules < 0), name
+    assert "feeds" in page.get_attribute("#budget .bars > div >> nth=0", "title")
+    page.click("#budget label:has-text('power')")
+    expect(page.locator("#budget output").first).to_have_text("−250 µW")
+
+
+def test_two_clicks_measure_time_frequency_and_differences_and_a_third_ends_it(stand_in, page):
+    ramp = [0.01 * i / 400 for i in range(401)]
+    stand_in.show(snapshot(0.0, 2.0, table("position", 0.0, 0.005, ("x", "m", "position", ramp))))
+    expect(page.locator("#position .legend")).to_contain_text("10.000")
+    box = page.locator("#position .u-over").bounding_box()
+    for part in (0.25, 0.75):
+        page.mouse.click(box["x"] + box["width"] * part, box["y"] + 20)
+    expect(page.locator("#position .note")).to_have_text(re.compile(r"^Δ (0\.99|1\.00)\d* s, 1\.0\d Hz$"))
+    expect(page.locator("#position .legend")).to_contain_text(re.compile(r"Δ (4\.9|5\.0)"))
+    page.mouse.click(box["x"] + box["width"] * 0.5, box["y"] + 20)
+    expect(page.locator("#position .note")).not_to_contain_text("Δ")
+
+
+def test_picture_and_numbers_are_saved_as_files(stand_in, page, tmp_path):
+    stand_in.show(contact())
+    expect(page.locator("#force .legend")).to_contain_text("total")
+    with page.expect_download() as saving:
+        page.click("#save-picture")
+    picture = tmp_path / "picture.png"
+    saving.value.save_as(picture)
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+    assert picture.stat().st_size > 20_000, "charts are in it"
+    with page.expect_download() as saving:
+        page.click("#save-data")
+    saving.value.save_as(tmp_path / "data.csv")
+    lines = (tmp_path / "data.csv").read_text().splitlines()
+    assert lines[0] == "table,place,quantity,unit,value"
+    walls = [line for line in lines if line.startswith("position,") and ",wall," in line]
+    assert len(walls) == 1000
+    assert float(walls[0].rsplit(",", 1)[1]) == pytest.approx(-0.06)
+
+
+def test_another_live_run_is_told_and_any_run_can_be_opened_or_drawn_over(stand_in, page):
+    expect(page.locator("#runs")).to_be_hidden()
+    stand_in.tell(RUNS)
+    expect(page.locator("#others")).to_have_text("1 other run is live")
+    expect(page.locator("#run option")).to_have_text(["abc123: one", "def456: two", "wall-1"])
+    assert page.input_value("#run") == "abc123"
+    opened = order(stand_in, page, lambda: page.select_option("#run", "def456"))
+    assert opened == ("open", {"run": "def456"})
+    over = order(stand_in, page, lambda: page.select_option("#overlay", "wall-1"))
+    assert over == ("overlay", {"run": "wall-1"})
+
+
+def test_dragging_the_strip_shows_another_part_of_the_run_and_its_end_is_live(stand_in, page):
+    stand_in.state(tick=10_000, end_tick=20_000)
+    stand_in.show(contact(8.0, 10.0))
+    expect(page.locator("#scrub-ends")).to_have_text("0.0–10.0 s")
+    page.fill("#scrub", "500")
+    asked = stand_in.asked(lambda watch: watch["end_s"] is not None)
+    assert (asked["span_s"], asked["end_s"]) == (pytest.approx(2.0), pytest.approx(5.0, abs=0.02))
+    page.fill("#scrub", "1000")
+    stand_in.asked(lambda watch: watch["end_s"] is None)
+
+
+def test_a_slider_sets_when_it_is_let_go_and_shades_what_lies_beyond_the_limit(stand_in, page):
+    stand_in.state(limit_N_m=300.0)
+    slider = page.locator("input[aria-label='wall.stiffness, coarse']")
+    expect(slider).to_have_attribute(
+        "title", "Beyond 300 N/m the loop as it is now, without quantisation and noise, is unstable."
+    )
+    share = float(slider.evaluate("e => e.style.getPropertyValue('--safe')").rstrip("%"))
+    assert share == pytest.approx(50 + 50 * 0.30103, abs=0.1), "log10 of 300 over 150"
+    slider.focus()
+    for _ in range(3):
+        page.keyboard.press("ArrowRight")
+    sent = [command["arguments"]["set"]["wall.stiffness"] for command in stand_in.commands()]
+    assert sent
+    assert sent[-1] == pytest.approx(150 * 10 ** (3 / 200), rel=0.01)
+    assert OPTIONS["settable"]["wall.position"]["value"] < 0
+    expect(page.locator("input[aria-label='wall.position, coarse']")).to_be_hidden()
+
+
+def test_the_change_panel_has_both_sides_and_says_what_is_not_held(stand_in, page):
+    t = [i / 1000 for i in range(500)]
+    side = {
+        "sight": RUNNING["sight"],
+        "budget": {"from_s": 0.0, "to_s": 0.5, "rows": [{"name": "hand", "window_J": -1e-3}]},
+    }
+    page.click("[data-panel=compare]")
+    expect(page.locator("#compare")).to_contain_text("Swap an element or set a number")
+    after = {**table("after", 2.0, 1e-3, ("x", "m", "", t), ("force", "N", "", t)), **side}
+    stand_in.show(with_header(snapshot(0.0, 2.0, after), change={"tick": 2000, "t_s": 2.0}))
+    expect(page.locator("#compare")).to_contain_text("not held any more")
+    before = {**table("before", 1.5, 1e-3, ("x", "m", "", t), ("force", "N", "", t)), **side}
+    stand_in.show(with_header(snapshot(0.0, 2.0, before, after), change={"tick": 2000, "t_s": 2.0}))
+    expect(page.locator("#compare")).not_to_contain_text("not held")
+    row = page.locator("#compare tr:has-text('hand')")
+    expect(row.locator("td")).to_have_text(["−2.00 mW", "−2.00 mW"])
