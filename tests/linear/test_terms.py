@@ -72,6 +72,8 @@ def test_limits_are_those_of_their_formulas_and_a_reason_stands_where_one_does_n
     curved = {**bare, "dissipation": [{"kind": "unidirectional-inertia", "mass": 0.004}]}
     assert limit("rho(M) = 1", **curved).why_not == "The scene has the element unidirectional-inertia."
     assert limit("rho(M) = 1, wall alone", **curved).stiffness_N_m == exact.stiffness_N_m
+    foaw = {**curved, "velocity": {"estimator": "foaw", "ticks": 16}}
+    assert limit("rho(M) = 1, wall alone", **foaw).stiffness_N_m == exact.stiffness_N_m
     undamped = limit("rho(M) = 1", **bare | {"device": {"mass": M, "damping": 0.0}})
     assert undamped.stiffness_N_m is None
     assert "it needs damping" in undamped.why_not

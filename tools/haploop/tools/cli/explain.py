@@ -157,7 +157,7 @@ def _terms(scene: Scene, planned: Plan) -> Table:
 def _limits(scene: Scene, limits: list[Limit]) -> Table:
     from rich.text import Text
 
-    table = make_table("limit of K by", "for", "K", "the wall here", numbers=("K",), unbroken=("for",))
+    table = make_table("limit of K by", "for", "K", "the wall here, or why none", numbers=("K",), unbroken=("for",))
     for limit in limits:
         if limit.stiffness_N_m is None:
             table.add_row(limit.name, limit.kind, "–", Text(limit.why_not), style="dim")
@@ -175,7 +175,8 @@ def _count(scene: Scene, count: OneCount) -> Table:
     table = make_table("one count of the encoder, in the wall and from rest", "at most", numbers=("at most",))
     table.add_row("position", amount(count.x_m, "m"))
     table.add_row("velocity, as estimated", amount(count.v_m_s, "m/s"))
-    table.add_row("acceleration, as estimated", amount(count.a_m_s2, "m/s²"))
+    if not (scene.acceleration and scene.acceleration.source == "accelerometer"):
+        table.add_row("acceleration, as estimated", amount(count.a_m_s2, "m/s²"))
     if scene.wall:
         deep = "" if make_wall(scene.wall).stiffness_and_damping() else f", {amount(DEEP_COUNTS * count.x_m, 'm')} deep"
         table.add_row(f"force of the wall{deep}", amount(count.wall_N, "N"))

@@ -78,7 +78,7 @@ def difference_table(found: Difference) -> RenderableType:
     from haploop.tools.render.terminal import make_table, verdict_style
     from haploop.tools.render.units import amount
 
-    table = make_table("", "first", "second")
+    table = make_table("", "first", "second", unbroken=("",))
     table.add_row("name", *(Text(name, "bold") for name in found.names))
     table.add_section()
     for key, pair in found.scene.items():

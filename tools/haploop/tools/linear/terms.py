@@ -42,7 +42,9 @@ def limits_of(scene: Scene, kinds: Kinds) -> list[Limit]:
     """
     found = [Limit(bound.name, bound.kind, bound.stiffness_N_m, bound.why_not) for bound in bounds_of(scene, kinds)]
     found.append(_exact("rho(M) = 1", scene, kinds))
-    alone = replace(scene, dissipation=())
+    # A spring asks for no velocity, so that what estimates it is out of the loop, too.
+    is_spring = scene.wall is None or not scene.wall.kind
+    alone = replace(scene, dissipation=(), **{"velocity": None, "acceleration": None} if is_spring else {})
     return [*found, *([_exact("rho(M) = 1, wall alone", alone, kinds)] if scene.dissipation else [])]
 
 
