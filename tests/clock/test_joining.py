@@ -12,6 +12,7 @@ import zmq
 
 from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.clock.server import ClockServer
+from haploop.launch.processes.foreign import Program
 from haploop.launch.processes.standstill import busy, late_observers
 from haploop.protocol.transport.messages import PROCESSES
 from helpers.live.attacks import Stranger, pack
@@ -154,3 +155,12 @@ def test_a_machine_that_has_too_much_to_do_is_told_of_and_another_is_not(monkeyp
     for load, said in ((6.0, ""), (20.2, " The machine was busy: load average 20 on 2 cores.")):
         monkeypatch.setattr(os, "getloadavg", lambda load=load: (load, 0.0, 0.0))
         assert busy() == said
+
+
+def test_a_pace_goes_by_the_controller_too_where_a_plant_of_anothers_reports_by_the_block() -> None:
+    for programs, tick in (({}, 0), ({"plant": Program("plant")}, 90)):
+        roster = Roster(programs)
+        assert roster.loop_tick() is None
+        for role, done in (("plant", 0), ("controller", 90)):
+            roster.nodes[role.encode()] = Node(role.encode(), role, 1, True, {}, 0.0, tick=done)
+        assert roster.loop_tick() == tick

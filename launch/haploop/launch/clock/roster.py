@@ -125,6 +125,16 @@ class Roster:
         """The tick of the slowest lossless node but plant and controller; it bounds what is in flight."""
         return min((node.tick for node in self.nodes.values() if node.lossless and not node.done), default=0)
 
+    def loop_tick(self) -> int | None:
+        """Returns the tick up to which a pace takes the loop as done: the plant's; None before it has joined.
+
+        One of somebody else's may report by the block, long after the controller has answered its samples.
+        """
+        plant, controller = self.own("plant"), self.own("controller")
+        if plant and controller and "plant" in self._programs:
+            return max(plant.tick, controller.tick)
+        return plant and plant.tick
+
     def common_tick(self) -> int:
         """Returns the last tick that all own processes have done."""
         return min((node.tick for node in self.nodes.values() if node.is_own), default=0)

@@ -116,8 +116,7 @@ class ClockServer:
     def grant(self) -> None:
         """Sends every node how far it may go and what changes on the way, if that is news."""
         clock = self._clock
-        plant = self.roster.own("plant")
-        until = clock.grant(self.roster.slowest(), self._machine.now(), plant and plant.tick)
+        until = clock.grant(self.roster.slowest(), self._machine.now(), self.roster.loop_tick())
         events = clock.take_events()
         if until == self._granted and clock.is_last == self._last_sent and not events:
             return
