@@ -87,7 +87,7 @@ class KillLauncher(Fault):
     def happen(self, sim: Sim) -> None:
         if sim.run.launcher.alive:
             sim.killed_at.setdefault("logger", sim.world.now)
-            sim.run.launcher.kill()
+            sim.run.launcher.kill(unwound_after_s=0.5)
 
 
 @dataclass(frozen=True)

@@ -176,13 +176,13 @@ class Process:
         self.stopped_until = max(self.stopped_until, self.world.now + seconds)
         self.stopped_s += seconds
 
-    def kill(self) -> None:
-        """Ends it now, whatever it is doing; its stack is unwound later."""
+    def kill(self, unwound_after_s: float = 0.0) -> None:
+        """Ends it now, whatever it is doing; its stack, with what that holds of the disk, is unwound later."""
         if self.alive:
             self.status = -9
             self._over()
             if self._greenlet is not getcurrent():
-                self.world.after(0.0, self.unwind)
+                self.world.after(unwound_after_s, self.unwind)
 
     def unwind(self) -> None:
         if self._greenlet and not self.alive:
