@@ -34,10 +34,10 @@ class Brake(Element):
     def force(self, motion):
         return {factor} * self.damping * motion.v
 """
-_HANGS, _DIES = "# hangs", "# dies"
+HANGS, _DIES = "# hangs", "# dies"
 SOUND = tuple(_FILE.format(default=0.1, factor=factor) for factor in (-1.0, -0.5))
 BROKEN = (
-    *("def", "1 / 0", "raise SystemExit(3)", _HANGS, _DIES, SOUND[0].replace("brake", "drag")),
+    *("def", "1 / 0", "raise SystemExit(3)", HANGS, _DIES, SOUND[0].replace("brake", "drag")),
     _FILE.format(default="float('nan')", factor=-1.0),
     SOUND[1] + SOUND[0].replace("brake", "damping").replace("Brake", "Damping"),
 )
@@ -74,8 +74,8 @@ class SimTrial:
             yield
 
     def load(self) -> Generator[None, None, dict[str, type[Element]]]:
-        yield from self._after(10.0 if self._source == _HANGS else self._world.dice.expovariate(30.0))
-        if self._source in (_HANGS, _DIES):
+        yield from self._after(10.0 if self._source == HANGS else self._world.dice.expovariate(30.0))
+        if self._source in (HANGS, _DIES):
             raise PluginError(f"The plugin {self._origin} was given up, or ended the process it was tried in.")
         return load_source(self._source, self._origin)
 

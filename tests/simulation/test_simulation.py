@@ -13,6 +13,7 @@ from simulation.defects import DEFECTS, put_back, seeds_needed
 from simulation.faults import Kill, LateStart, Stop, When
 from simulation.plan import Plan, draw, fewest, shrink, tell
 from simulation.play import play
+from simulation.plugins import BROKEN, HANGS, SOUND, Reload
 from simulation.visitors import Impostor, SecondLogger, Stranger
 
 _STARTS_S = {"plant": 0.1, "controller": 0.2, "logger": 0.3}
@@ -68,6 +69,14 @@ def test_a_seed_gives_the_same_history_again() -> None:
     assert first.history == second.history
     assert first.how == second.how
     assert len(first.history) > 6
+
+
+def test_a_sound_plugin_is_taken_up_by_a_run_that_goes_on_and_no_broken_one() -> None:
+    reload = Reload(When(5, 0.0), _STAYS, (SOUND[1], *(text for text in BROKEN if text != HANGS), SOUND[0]))
+    outcome = play(replace(_CALM, pace=0.02, faults=(reload,)))
+    assert (outcome.broken, outcome.how) == ("", "in order")
+    told = [what for _, what in outcome.history if "brake" in what and not what.startswith("Reload")]
+    assert ["becomes brake" in what for what in told] == [True, *[False] * (len(BROKEN) - 1), True]
 
 
 @given(st.lists(st.integers(0, 9), unique=True, max_size=9), st.sets(st.integers(0, 9), max_size=3))
