@@ -168,10 +168,6 @@ def _not_exclusively(kept: Method) -> Method:
     return claimed
 
 
-def _any_burden(kept: Method) -> Method:
-    return lambda arguments: None
-
-
 def _keeps_objects(kept: Method) -> Method:
     def append_chunk(self: Any, piece: bytes, index: Any) -> None:
         kept(self, piece, index)
@@ -180,8 +176,8 @@ def _keeps_objects(kept: Method) -> Method:
     return append_chunk
 
 
-# What the defect is -> the class or module, its method, and what makes the defective one of it.
-DEFECTS: dict[str, tuple[Any, str, Callable[[Method], Method]]] = {
+# What the defect is -> the class or module, its method or constant, and what makes the defective one of it.
+DEFECTS: dict[str, tuple[Any, str, Callable[[Any], Any]]] = {
     "a grant goes back when a slower node joins": (Clock, "grant", _goes_back),
     "PROGRESS is taken from somebody who has not joined": (ClockServer, "_take", _from_strangers),
     "a JOIN without endpoints is welcomed": (ClockServer, "_join", _without_endpoints),
@@ -198,7 +194,7 @@ DEFECTS: dict[str, tuple[Any, str, Callable[[Method], Method]]] = {
     "a second lossless node is not waited for": (Roster, "slowest", _not_waited_for),
     "two runs that start at one instant take one directory": (spec, "_claimed", _not_exclusively),
     "blocks from before a STATE are taken": (Subscriber, "_follows", _before_its_state),
-    "one command may carry any number of keys": (commands, "_check_burden", _any_burden),
+    "one command may carry any number of keys": (commands, "_MOST_VALUES", lambda kept: 10**9),
     "the log keeps objects of every chunk": (McapFile, "append_chunk", _keeps_objects),
 }
 

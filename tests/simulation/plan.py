@@ -43,7 +43,7 @@ _STAYS = ("stays", 0.0)
 _LONG = 0.004
 _ASKED = ("ask", "pause", "step", "pace", "stop", "set", "set", "swap", "swap", "impossible", "limit")
 # Commands at the limits of what one may carry, and beyond: unknown keys, letters of a text, waiting changes.
-_KEYS, _LETTERS, _WAITING = (31, 32, 3000, 10_000), (200, 201, 30_000), 101
+_KEYS, _LETTERS, _WAITING = (31, 3000, 3000, 10_000), (200, 201, 30_000), 101
 # Those that ``ask`` can send.
 _IMPOSSIBLE = [
     (verb, arguments)
@@ -149,7 +149,7 @@ def _commands(dice: Random) -> Commands:
 
 def _at_a_limit(dice: Random) -> list[tuple[str, dict[str, Any], float]]:
     """Commands that are just possible, or just no more."""
-    match dice.choice(("keys", "letters", "step", "pace", "at", "waiting")):
+    match dice.choice(("keys", "keys", "letters", "step", "pace", "at", "waiting")):
         case "keys":
             return [("set", {"set": {f"wall.stiffnes{i}": 1.0 for i in range(dice.choice(_KEYS))}}, 0.0)]
         case "letters":
