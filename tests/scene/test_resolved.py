@@ -43,7 +43,11 @@ def test_what_a_scene_cannot_hold_is_refused(value):
 _NUMBER = st.floats(-1e6, 1e6)
 _POSITIVE = st.floats(1e-6, 1e6)
 _ELEMENT = st.sampled_from(sorted(KINDS)).map(
-    lambda kind: {"kind": kind, **dict.fromkeys(KINDS[kind].parameters(), 0.1), "acts": "always"}
+    lambda kind: {
+        "kind": kind,
+        **{name: 2 if quantity.whole else 0.1 for name, (quantity, _) in KINDS[kind].parameters().items()},
+        "acts": "always",
+    }
 )
 _RAMP = st.fixed_dictionaries({"kind": st.just("ramp"), "value": _NUMBER, "rise_time": _POSITIVE})
 _TRACE = st.fixed_dictionaries({"kind": st.just("trace"), "time": st.just([0.0, 0.1]), "force": st.just([-0.0, 1])})

@@ -276,5 +276,6 @@ def test_all_element_kinds_can_be_swept(tmp_path: Path) -> None:
     """The keys of every kind are found, whichever the base scene holds."""
     for kind, element in KINDS.items():
         for name, (quantity, _) in element.parameters().items():
-            text = f'[axes]\n"dissipation.0.kind" = ["{kind}"]\n"dissipation.0.{name}" = [0.01, 0.02]\n'
+            values = "[1, 2]" if quantity.whole else "[0.01, 0.02]"
+            text = f'[axes]\n"dissipation.0.kind" = ["{kind}"]\n"dissipation.0.{name}" = {values}\n'
             assert loaded(tmp_path, text).axes[1].unit == quantity.unit

@@ -85,7 +85,8 @@ def settable_keys(
     slots: list[Any], wall: type[WallLaw] | None, kinds: Mapping[str, type[Element]]
 ) -> dict[str, Number]:
     """Returns every key that can be set while these kinds are at work, and the number that reads its value."""
-    of_wall = {f"wall.{name}": number_of(Wall, name) for name in (*SETTABLE_OF_WALL, *wall.keys)} if wall else {}
+    of_wall = {f"wall.{name}": number_of(Wall, name) for name in SETTABLE_OF_WALL if wall}
+    of_wall |= {f"wall.{name}": Number(quantity) for name, quantity in (wall.keys if wall else {}).items()}
     elements = {
         f"dissipation.{slot}.{name}": Number(quantity)
         for slot, kind in enumerate(slots)
@@ -98,7 +99,9 @@ def settable_keys(
 def _wall_of(layers: Layers) -> type[WallLaw] | None:
     """Returns the kind of the scene's wall; a spring for a kind that there is not, a mistake reported elsewhere."""
     table = layers.data.get("wall")
-    return all_walls().get(str(table.get("kind")), Spring) if isinstance(table, dict) else None
+    if not isinstance(table, dict):
+        return None
+    return all_walls().get(str(table["kind"]), Spring) if "kind" in table else Spring
 
 
 def _setting(

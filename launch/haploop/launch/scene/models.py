@@ -34,6 +34,7 @@ class Model(BaseModel):
 
 
 TableType = TypeVar("TableType", bound=Table)
+_SPRING_KEYS = {"position", "stiffness", "occupies"}
 # Of a model that is to be made: key -> (type, default).
 Keys = dict[str, Any]
 
@@ -115,7 +116,9 @@ def _validated(hint: Any) -> Any:
 
 
 def number_of(table: type[Table], key: str) -> Number:
-    return next(mark for mark in model_of(table).model_fields[key].metadata if isinstance(mark, Number))
+    declared = get_type_hints(table, include_extras=True).get(key)
+    marks = get_args(_validated(declared)) if declared else model_of(table).model_fields[key].metadata
+    return next(mark for mark in marks if isinstance(mark, Number))
 
 
 def read_table(table: type[TableType], data: Any) -> TableType | None:
@@ -128,20 +131,30 @@ def read_table(table: type[TableType], data: Any) -> TableType | None:
         return None
 
 
-def scene_model(kinds: Mapping[str, type[Element]], named: Iterable[str] | None = None) -> type[Model]:
+def scene_model(kinds: Mapping[str, type[Element]], named: Mapping[str, Any] | None = None) -> type[Model]:
     """Makes the model of the scene, with the kinds of dissipation element that are at hand.
 
     Args:
-        named: the keys that are there: the model takes what that of the whole scene would take, and is made sooner.
+        named: the tables that are there: the model takes what that of the whole scene would take, and is made sooner,
+            without other walls than the spring where it is one.
     """
-    return _scene_model(tuple(kinds.items()), None if named is None else frozenset(named))
+    if named is None:
+        return _scene_model(tuple(kinds.items()), None)
+    wall = named.get("wall")
+    is_plain = isinstance(wall, dict) and wall.keys() <= _SPRING_KEYS
+    return _scene_model(tuple(kinds.items()), frozenset(named), is_plain)
 
 
 @cache
-def _scene_model(kinds: tuple[tuple[str, type[Element]], ...], named: frozenset[str] | None) -> type[Model]:
+def _scene_model(
+    kinds: tuple[tuple[str, type[Element]], ...], named: frozenset[str] | None, has_spring: bool = False
+) -> type[Model]:
     nothing = _model(NO_ELEMENT, "Removes the element.", {"kind": (Literal["none"], ...)})
     elements = [_element_model(kind, element) for kind, element in kinds]
     others: Keys = {"dissipation": (list[_one_of(elements or [nothing])] | None, None), "event": (None, None)}
+    if has_spring:
+        keys = {key: kept for key, kept in _keys_of(Wall, {}).items() if key in _SPRING_KEYS}
+        others["wall"] = _model("Wall", Wall.__doc__, keys) | None, None
     if named is None or "event" in named:
         changes: Keys = {
             "swap": (_one_of([*elements, nothing]) | None, None),

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def check_wall(layers: Layers) -> None:
     """Adds keys that a wall lacks or does not take to the mistakes; values wrong in themselves are passed over."""
     table = layers.data.get("wall")
-    if not isinstance(table, dict):
+    if not isinstance(table, dict) or table.keys() <= {"position", "stiffness", "occupies"}:
         return
     walls, name = all_walls(), table.get("kind", "spring")
     if not isinstance(name, str) or name not in walls:

@@ -51,10 +51,10 @@ class PassivityControllerReset(Element):
 
 
 class PassivityControllerReference(Element):
-    """A passivity controller that keeps W above K p^2 / 2, what an ideal spring holds at the penetration p.
+    """A passivity controller that keeps W above V(p), what the wall's potential holds at the penetration p.
 
     After Ryu, Preusche, Hannaford & Hirzinger 2005 (reference energy following): it acts as soon as the sampled wall
-    takes less than a spring would, also on the way in.
+    takes less than is stored in an ideal one, K p^2 / 2 of a spring, also on the way in.
     """
 
     kind = "passivity-controller-reference"
