@@ -32,10 +32,11 @@ PAGE, FIGURE = "comparison.md", "comparison.png"
 _INTRO = """\
 Every stabilizer that comes with haploop, each tuned by the same search with the same effort on the same task, then
 tried under seeds that the search has not seen. Written by `make comparison`; `haploop compare DEVICE` does the same
-for a device or a scene of yours. A *ranking* is told where 95 % intervals are apart under both of two sets of seeds
-that share nothing, tuning included; all else cannot be told apart. Every loop is named by its device and its round-
-trip delay: the Premium 1.5 has a cable, the Touch and the omega.3 are taken as rigid, so that without a delay they
-would bear walls that no device renders."""
+for a device or a scene of yours, also with more delay, a finer encoder and a slower drive. Two are *ranked* where the
+95 % interval of their difference, seed by seed under the same conditions, does not hold 0, the same way under two sets
+of seeds that share nothing, tuning included; all else cannot be told apart. Every loop is named by its device and its
+round-trip delay: the Premium 1.5 has a cable, the Touch and the omega.3 are taken as rigid, so that without a delay
+they would bear walls that no device renders."""
 _MOST = "Most is rendered {0}."
 _TAKE = "Take the simplest of those that cannot be told from the best: {0}."
 _ALL, _NONE = "on every loop", "on none"

@@ -23,8 +23,9 @@ READING = (
     "mean force over mean penetration, with its 95 % interval over the seeds. Contact: slope of the force on the first "
     "way in. Ripple: of the command above 30 Hz, peak to peak. Extra: the element's own force, largest and root mean "
     "square. ±20 %: what is held with all parameters, or the device, 20 % less and 20 % more, over that without. * a "
-    "parameter at the end of its search, † no wall was too stiff: what is told may be more elsewhere. Stabilizers "
-    "whose intervals overlap cannot be told apart. Bold: those not told from the best."
+    "parameter at the end of its search, † no wall was too stiff: what is told may be more elsewhere. Two are "
+    "apart where the interval of their difference, seed by seed under the same conditions, does not hold 0; ranked is "
+    "what is apart under two sets of seeds, tuning included. Bold: those not told from the best."
 )
 _TIED = "{0} renders most, {1}; it cannot be told apart from {2}."
 _FIRST = "{0} renders most, {1}, and more than every other."
