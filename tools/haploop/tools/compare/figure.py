@@ -32,21 +32,23 @@ def draw(told: Comparison, target: Path) -> Path:
 
 
 def figure_of(comparisons: list[Comparison]) -> Figure:
-    """Makes a row of three panels a device: what is held as described under both sets of seeds, what is held on the
-    other loops, and ripple and force of the element.
+    """Makes a row of panels a device: what is held as described under both sets of seeds, what is held on the other
+    loops where there are any, and ripple and force of the element.
 
     Raises FigureError where matplotlib is missing.
     """
     rows = [len(told.loops[0].rows) for told in comparisons]
     heights = [count * _ROW_IN + _BESIDE_IN for count in rows]
     figure = style.empty_figure(_WIDTH_IN, sum(heights))
-    axes = figure.subplots(len(comparisons), 3, squeeze=False, width_ratios=(1.25, 1.0, 0.8), height_ratios=heights)
-    for (left, middle, right), told in zip(axes, comparisons, strict=True):
-        first, others = told.loops[0], told.loops[1:]
-        _held(left, told, first)
-        _loops(middle, first, others)
-        _costs(right, first)
-        for ax in (middle, right):
+    has_others = any(told.loops[1:] for told in comparisons)
+    widths = (1.25, 1.0, 0.8) if has_others else (1.5, 0.8)
+    axes = figure.subplots(len(comparisons), len(widths), squeeze=False, width_ratios=widths, height_ratios=heights)
+    for (left, *middle, right), told in zip(axes, comparisons, strict=True):
+        _held(left, told, told.loops[0])
+        for ax in middle:
+            _loops(ax, told.loops[0], told.loops[1:])
+        _costs(right, told.loops[0])
+        for ax in (*middle, right):
             ax.set_yticklabels([])
     return figure
 
@@ -71,7 +73,7 @@ def _held(ax: Axes, told: Comparison, of: OfLoop) -> None:
     if of.again:
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=1, fontsize=6.5, frameon=False, borderpad=0.0)
     seeds, cases = told.effort.seeds, told.effort.of_seed
-    blue = f"blue: not told from the best, {format_stiffness(held(found).value)}"
+    blue = f"blue: seed by seed not told from the best, {format_stiffness(held(found).value)}"
     ax.set_xlabel(f"held stiffness, N/mm (95 % over {seeds} seeds of {cases};\n{blue})", fontsize=style.SMALL)
 
 

@@ -35,13 +35,14 @@ tried under seeds that the search has not seen. Written by `make comparison`; `h
 for a device or a scene of yours, also with more delay, a finer encoder and a slower drive. Two are *ranked* where the
 95 % interval of their difference, seed by seed under the same conditions, does not hold 0, the same way under two sets
 of seeds that share nothing, tuning included; all else cannot be told apart. Every loop is named by its device and its
-round-trip delay: the Premium 1.5 has a cable, the Touch and the omega.3 are taken as rigid, so that without a delay
-they would bear walls that no device renders."""
+round-trip delay: a device without a cable is taken as rigid, and without a delay would bear walls that no device
+renders. *Held* may be more than the wall where counts of the encoder are coarse: it reads deeper than the device is."""
 _MOST = "Most is rendered {0}."
 _TAKE = "Take the simplest of those that cannot be told from the best: {0}."
 _ALL, _NONE = "on every loop", "on none"
 _VERSUS = "{0} renders more than {1} {2}, less {3}, and cannot be told from it {4}"
-_HELPS, _MIXED, _NOT = "adaptive inertia helps there", "adaptive inertia is no remedy", "adaptive inertia does not help"
+_HELPS, _MIXED = "adaptive inertia helps there", "adaptive inertia is no remedy"
+_NOT = "adaptive inertia does not help, as far as can be told"
 _HEADS = ("element", "parameter", "wall", "held", "contact", "ripple", "extra", "±20 %", "device ±20 %", "breaks first")
 _STIFFNESSES = ("wall", "held", "contact")
 _LIMITS = """\

@@ -99,7 +99,7 @@ def cells(row: Row) -> dict[str, str]:
         "extra": f"{amount(mean('extra_N'), 'N', 2)}, {amount(mean('extra_rms_N'), 'N', 2)}" if row.values else "–",
         "±20 %": _shares(row.parameter),
         "device ±20 %": _shares(row.device),
-        "breaks first": f"{format_stiffness(row.breaks[0])}: {row.breaks[1]}" if row.breaks else "–",
+        "breaks first": _breaks(row),
     }
 
 
@@ -127,12 +127,12 @@ def _costs(of: OfLoop) -> Table:
              "device ±20 %": "device\n±20 %", "breaks first": "breaks first"}  # fmt: skip
     table = make_table(*heads.values(), numbers=[heads["ripple"]])
     for row in of.rows:
-        told = cells(row) | {"breaks first": _short(row)}
+        told = cells(row)
         table.add_row(*(told[name] for name in heads))
     return table
 
 
-def _short(row: Row) -> str:
+def _breaks(row: Row) -> str:
     """Says where a wall breaks first, in short: how stiff, how often it swings, and at which hold."""
     worst = min((each for each in row.seeds if each.failure), key=lambda each: each.fails_N_m, default=None)
     if not worst or not worst.failure:
