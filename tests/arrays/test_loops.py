@@ -19,7 +19,8 @@ from haploop.launch.batch import batch
 from haploop.launch.batch.run import run_batch
 from haploop.logger.books import work
 from haploop.logger.books.work import BatchSums
-from haploop.protocol.machine_code import MachineCode, WhereItPays
+from haploop.plant.where_it_pays import WhereItPays
+from haploop.protocol.machine_code import MachineCode
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.sweep.sweep_file import load
 from helpers.runs.batches import alone, diverging, pressed, together

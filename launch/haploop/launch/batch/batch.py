@@ -20,7 +20,7 @@ from haploop.logger.batch import BatchLogger, MemberEnd
 from haploop.logger.summary import Summary
 from haploop.plant.motion.one_mass import OneMassMotion
 from haploop.plant.plant import beyond
-from haploop.protocol.machine_code import WhereItPays
+from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select, tree_take

@@ -18,7 +18,7 @@ Stage = Literal["motion", "measurement", "estimate", "line", "actuation"]
 HISTORY = tuple(f"haploop.plant.chain.{name}" for name in ("history", "chain", "sensed_acceleration", "transition"))
 _EXACT = ("haploop.plant.chain.motion",)
 CHAIN = (*_EXACT, *HISTORY)
-RUBBING = tuple(f"haploop.plant.friction.{name}" for name in ("motion", "substeps"))
+RUBBING = *(f"haploop.plant.friction.{name}" for name in ("motion", "substeps")), "haploop.plant.where_it_pays"
 # Shared by the one-step methods.
 LINEAR_RATES = ("haploop.plant.integrators.linear_rates",)
 DRAWN = ("haploop.plant.streams",)

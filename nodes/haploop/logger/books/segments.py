@@ -12,7 +12,7 @@ import numpy as np
 from haploop.logger.books.buffers import PIECES
 from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.transition import ChainIntegrals, make_tables
-from haploop.protocol.machine_code import WhereItPays
+from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.trees import tree_select
 
 Columns = dict[str, np.ndarray]

@@ -22,7 +22,7 @@ from haploop.plant.friction.stick_slip import (
 )
 from haploop.plant.friction.substeps import goes_by_whole_steps, halving_of, pieces_record, solve_step
 from haploop.plant.line import Hold
-from haploop.protocol.machine_code import WhereItPays
+from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_member, tree_take
