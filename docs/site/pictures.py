@@ -9,8 +9,8 @@ from pathlib import Path
 
 from PIL import Image
 
-# Pixels across, and colours of a palette: a picture then takes some 60 kB.
-WIDTH, COLOURS = 1000, 64
+# Pixels across, and colours of a palette: a picture then takes some 80 kB.
+WIDTH, COLOURS = 1000, 128
 NO_SWAP = ("--set", "event=[]")
 # By picture: the commands, {} the directory, and the figure that they leave, whose place the last word of stdout names.
 STEPS = {

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # So much of either side is drawn as loops of force against penetration, s.
 _LOOPS_S = 0.1
 _LETTERS = 118
-_PENETRATION = "penetration (mm); what the loop encloses is given to the device"
+_PENETRATION = "penetration (mm); the area is energy given away"
 
 
 def draw(story: Story, target: Path) -> Path:
