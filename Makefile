@@ -76,7 +76,7 @@ docs: $(READY) ## make the documentation as a site in site/ (index.html); a warn
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo site/index.html
 
-pictures: $(READY) ## make the pictures of README's walk anew (some ten minutes, most of it advice)
+pictures: $(READY) ## make the pictures of README's walk anew (half a minute)
 	@$(BIN)/python docs/site/pictures.py docs/pictures
 
 notebook: $(READY) ## run docs/notebook.ipynb anew and keep its figures
