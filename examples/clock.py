@@ -17,6 +17,7 @@ class Clock:
 
     def __init__(self, sockets, address):
         self._socket = sockets.open(zmq.DEALER)
+        self._socket.sndtimeo = 20_000  # one that the clock's keys turn away is connected to nothing
         sockets.connect(self._socket, address)
         self.until, self.last, self.delays = 0, False, []
         self._heard, self._silence_s = time.monotonic(), math.inf

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -91,6 +92,13 @@ def test_the_half_of_somebody_elses_is_held_against_what_our_own_would_have_done
     same = replay(left(tmp_path / "same", ran, foreign)).other
     assert same == f"Haploop's own {foreign} would have done the same there, to the bit."
     assert replay(left(tmp_path / "other", ran, foreign, told=with_value(ran, key, value))).other.startswith(says)
+
+
+def test_a_force_that_is_no_number_is_as_far_from_our_own_as_can_be(tmp_path: Path):
+    recorded = logged_run(left(tmp_path / "run", scene(**TAP), "controller"))
+    recorded["/controller"]["total"] = np.append(recorded["/controller"]["total"][:-1], np.nan)
+    said = beside_own("controller", *repeatable(tmp_path / "run", recorded), recorded)
+    assert said.endswith("with forces that differ by up to inf N, first at 0.199 s.")
 
 
 def test_a_change_that_a_controller_refused_is_not_asked_of_our_own_either(tmp_path: Path):

@@ -104,10 +104,11 @@ def beside_own(
         topic, name, own = "/controller", "total", repeat_controller(scene, kinds, made, recorded)
     theirs, ours = recorded[topic][name], own[topic][name]
     count = min(len(theirs), len(ours))
-    apart = np.abs(theirs[:count] - ours[:count])
+    with np.errstate(invalid="ignore"):
+        apart = np.nan_to_num(np.abs(theirs[:count] - ours[:count]), nan=np.inf)
     if not apart.any():
         return _SAME.format(role)
-    most, first = float(np.fmax.reduce(apart)), float(recorded[topic]["timestamp"][np.argmax(apart != 0.0)])
+    most, first = float(apart.max()), float(recorded[topic]["timestamp"][np.argmax(apart != 0.0)])
     return _OTHER_WAY.format(most) if role == "plant" else _OTHER_FORCES.format(most, first)
 
 
