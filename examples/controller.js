@@ -13,9 +13,10 @@ const CAN_SET = ["wall.stiffness", "wall.position", "dissipation.0.damping", "cl
 
 class Law {
   constructor({ wall, dissipation: [element, ...others] = [], velocity, acceleration }, rate) {
-    if (!wall || element?.kind !== "damping" || others.length || velocity || acceleration)
+    const isSpring = wall && (wall.kind ?? "spring") === "spring";
+    if (!isSpring || element?.kind !== "damping" || others.length || velocity || acceleration)
       throw new Error(
-        "This controller is a wall with one damping and plain differences, but the scene asks for another.",
+        "This controller is a spring wall with one damping and plain differences, but the scene asks for another.",
       );
     this.wall = { position: wall.position, stiffness: wall.stiffness, into_wall: wall.occupies === "below" ? -1 : 1 };
     this.element = {

@@ -174,8 +174,9 @@ static void make_change(void) {
 static void begin_law(msgpack_object scene, msgpack_object timebase) {
   msgpack_object wall = at(scene, "wall"), elements = at(scene, "dissipation");
   if (wall.type != MSGPACK_OBJECT_MAP || (elements.type == MSGPACK_OBJECT_ARRAY && elements.via.array.size) ||
-      at(scene, "velocity").type == MSGPACK_OBJECT_MAP || at(scene, "acceleration").type == MSGPACK_OBJECT_MAP)
-    fail("This controller is a wall alone with plain differences, but the scene asks for another.");
+      at(scene, "velocity").type == MSGPACK_OBJECT_MAP || at(scene, "acceleration").type == MSGPACK_OBJECT_MAP ||
+      (at(wall, "kind").type == MSGPACK_OBJECT_STR && strcmp(text(at(wall, "kind")), "spring")))
+    fail("This controller is a spring wall alone with plain differences, but the scene asks for another.");
   law.position = number(at(wall, "position")), law.stiffness = number(at(wall, "stiffness"));
   law.into_wall = strcmp(text(at(wall, "occupies")), "below") ? 1 : -1;
   law.period = 1 / number(at(timebase, "control_rate"));
