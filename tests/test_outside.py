@@ -121,7 +121,7 @@ def test_the_schema_for_editors_has_their_keys() -> None:
 
 
 def test_the_plan_and_explain_say_what_they_do_and_cost(scene: Path) -> None:
-    told = json.loads(outside("explain", scene, "--json").stdout)
+    told = json.loads(outside("explain", "--cost", scene, "--json").stdout)
     effects = {effect["name"]: effect for effect in told["effects"]}
     assert set(effects) == {"gravity", "velocity.estimator = alpha-beta", "clock.integrator = kutta-3-8"}
     assert {effect["modules"][0] for effect in effects.values()} == {"haploop_outside"}
