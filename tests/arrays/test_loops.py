@@ -159,7 +159,13 @@ def test_loops_are_loaded_once_enough_was_asked_of_a_process_and_no_sooner(
     (tmp_path / "loops_that_count.py").write_text("tried = []\ndef try_out(): tried.append(1)\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     loops = WhereItPays("loops_that_count", 10)
+    monkeypatch.setattr(WhereItPays, "may_wait", True)
     found = [loops.module_for(4) for _ in range(4)]
     assert found[:2] == [None, None]
     assert found[2] is found[3]
     assert found[2].tried == [1]
+
+
+def test_a_process_that_others_wait_for_loads_no_loops(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(WhereItPays, "may_wait", False)
+    assert WhereItPays("loops_that_would_be_missed", 0).module_for(10**9) is None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import Any, ClassVar
 
 
 class WhereItPays:
@@ -12,18 +12,22 @@ class WhereItPays:
     The module has ``try_out()``, which raises where the loops cannot be compiled, or loaded.
 
     Attributes:
+        may_wait: whether this process may wait until they are compiled, 12 s, or a minute on a busy machine: not the
+            nodes of a run, which have deadlines; runs in one process and batches set it.
         pays: from how much on it pays.
         asked: how much was to be done so far.
     """
+
+    may_wait: ClassVar[bool] = False
 
     def __init__(self, module: str, pays: float) -> None:
         self.pays, self.asked = pays, 0
         self._name, self._loaded = module, []
 
     def module_for(self, amount: int) -> Any:
-        """Returns the module where it pays with so much more to do, and works; else None."""
+        """Returns the module where it pays with so much more to do, and may be waited for, and works; else None."""
         self.asked += amount
-        return self.module() if self.asked >= self.pays else None
+        return self.module() if self.may_wait and self.asked >= self.pays else None
 
     def module(self) -> Any:
         """Returns the module, or None where it does not work."""

@@ -92,6 +92,7 @@ class Batch(BatchLoop):
         energy: bool = True,
         trajectories: bool = False,
     ) -> None:
+        WhereItPays.may_wait = True
         self._scenes, scene = scenes, stacked(scenes)
         time = Timebase.from_scene(scene)
         rows = BatchRecorder()

@@ -19,6 +19,7 @@ from haploop.launch.stability.still_hand import End
 from haploop.logger.session import LogSession, open_session
 from haploop.logger.summary import Summary
 from haploop.plant.plant import Plant
+from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.changes import Event, is_change, refusal
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import BlockLength, Timebase
@@ -76,6 +77,7 @@ class Loop:
     """Plant, controller and session of one scene, advanced block by block."""
 
     def __init__(self, scene: Scene, time: Timebase, kinds: dict[str, type[Element]], session: LogSession) -> None:
+        WhereItPays.may_wait = True
         self._plant, self._controller = Plant(scene, time), Controller(scene, time, kinds)
         self._scene, self._session = scene, session
         self._end = time.ticks
