@@ -107,9 +107,9 @@ def test_growth_and_decay_have_words_of_their_own():
     assert seen(lambda t: np.where(t > 2.9, np.nan, -1e-3)).word == "not finite"
 
 
-def recorded(tmp_path):
+def recorded(tmp_path, **values):
     """The history of a run of 3 s, and its summary."""
-    loaded = load("fig6c").set({"duration": 3.0})
+    loaded = load("fig6c").set({"duration": 3.0, **values})
     result = run(loaded, out=tmp_path / "run")
     time = Timebase.from_scene(loaded.scene)
     backfill = Backfill(tmp_path / "run", loaded.scene, time, [])
@@ -138,6 +138,17 @@ def test_the_budget_closes_and_its_causes_are_those_of_the_summary(tmp_path):
     for late, soon, whole in zip(last["rows"], early["rows"], found["rows"], strict=True):
         assert late["window_J"] + soon["total_J"] == pytest.approx(whole["total_J"], abs=1e-15)
     assert abs(sum(row["window_J"] for row in last["rows"])) < 1e-17
+
+
+def test_what_the_law_of_a_wall_takes_is_a_cause_of_its_own_and_no_leak(tmp_path):
+    damped = {"duration": 0.3, "wall.position": 0.001, "wall.kind": "kelvin-voigt", "wall.damping": 1.0}
+    history, summary = recorded(tmp_path, **damped)
+    found = budget(history, 0, history.end_tick)
+    assert found
+    total, of_wall = {row["name"]: row["total_J"] for row in found["rows"]}, summary["energy"]["wall"]
+    assert total["law of the wall"] == pytest.approx(of_wall["dissipated_J"], rel=0.02)
+    assert total["sampling and hold"] == pytest.approx(of_wall["leak"]["sampling_and_hold_J"], rel=0.02)
+    assert abs(sum(total.values())) < 1e-12 * summary["energy"]["moved_J"]
 
 
 def test_the_two_sides_of_a_change_are_kept_also_when_the_history_has_forgotten_the_first():

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from haploop.logger.books.ideal_wall import DISSIPATED
 from haploop.view.store.history import EARLIER, TRUE, WALL_BOOK, History
 
 # Books of the plant in the order in which they are told; all but these are named after themselves.
@@ -60,8 +61,12 @@ def _causes(names: Sequence[str]) -> Iterator[tuple[str, list[tuple[float, str]]
         if name.endswith("_work"):
             yield _LABELS.get(name, name.removesuffix("_work")), [(-1.0, name)]
     has_wall = "ideal" in names
+    by_law = [(-1.0, DISSIPATED)] if DISSIPATED in names else []
     for label, up_to, start in _OF_WALL if has_wall else ():
-        yield label, [(1.0, up_to), (-1.0, start)]
+        estimates = " and estimates" if by_law and label == "quantisation" else ""  # a damper goes by the estimated v
+        yield label + estimates, [(1.0, up_to), (-1.0, start), *(by_law if start == "ideal" else [])]
+    if by_law:
+        yield "law of the wall", [(1.0, DISSIPATED)]
     for name in names:
         if name.endswith(TRUE) and name != WALL_BOOK:
             yield _LABELS.get(name, name.removesuffix(TRUE)), [(1.0, name)]
