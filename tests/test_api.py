@@ -63,10 +63,15 @@ def test_elements_on_a_recorded_motion_take_what_the_formula_says(tmp_path: Path
 
 
 @pytest.mark.slow
-def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_scene(tmp_path: Path) -> None:
+def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_scene(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scene = load("fig6b", SHORT)
-    with start(scene, tmp_path / "out", paused=True) as loop:
-        assert attach(loop.id[:4]).id == loop.id
+    monkeypatch.chdir(tmp_path)
+    with start(scene, "out", paused=True) as loop:
+        other = attach(loop.id[:4])
+        assert other.id == loop.id
+        monkeypatch.chdir("/")  # a relative directory stays where it was
         with pytest.raises(TimeoutError):
             loop.wait(0.01)
         assert loop.step(100) == 100
@@ -76,6 +81,7 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
         loop.set({"wall.stiffness": "0.2 N/mm"}, at=0.2)
         live = loop.finish()
         assert loop.wait() is live
+        assert other.wait(60.0).summary == live.summary
         with pytest.raises(RunNotFound):
             loop.pause()
     written = scene.swap("unidirectional-inertia", at=tick * 1e-3, mass=0.01).set({"wall.stiffness": 200}, at=0.2)

@@ -21,8 +21,7 @@ from haploop.launch.processes import run_directory
 from haploop.launch.processes.run_directory import Elsewhere, LiveRun, RunNotFound, ask
 from haploop.launch.runs.loaded_scene import LoadedScene, load, plain
 from haploop.launch.runs.result import Result
-from haploop.launch.scene.file import load as load_resolved
-from haploop.launch.spec import SCENE, RunFailed
+from haploop.launch.spec import PLUGINS, SCENE, RunFailed
 from haploop.logger.log.recording import Recording
 from haploop.logger.session import LOG
 from haploop.logger.summary import SUMMARY
@@ -74,7 +73,7 @@ def start(
     """
     scene = scene if isinstance(scene, LoadedScene) else load(scene)
     scratch = tempfile.TemporaryDirectory(prefix="haploop-")
-    file, directory = Path(scratch.name, SCENE), Path(scratch.name, "run") if out is None else Path(out)
+    file, directory = Path(scratch.name, SCENE), Path(scratch.name, "run") if out is None else Path(out).resolve()
     file.write_text(str(scene), encoding="utf-8")
     words = [sys.executable, "-m", "haploop.tools.cli", "run", str(file), "--out", str(directory), "--json"]
     words += ["--pace", repr(_STANDING) if paused else "free" if math.isinf(pace) else repr(float(pace))]
@@ -84,9 +83,13 @@ def start(
         process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=errors, process_group=0)
     started = _Started(process, scratch, out is not None)
     found: list[LiveRun] = []
-    while not found and process.poll() is None:
-        time.sleep(_LOOK_S)
-        found = [run for run in run_directory.live_runs() if run.pid == process.pid]
+    try:
+        while not found and process.poll() is None:
+            time.sleep(_LOOK_S)
+            found = [run for run in run_directory.live_runs() if run.pid == process.pid]
+    except BaseException:
+        started.end()
+        raise
     if not found and process.returncode:
         why = started.told()
         started.end()
@@ -235,7 +238,7 @@ class LiveLoop:
         directory, kept = Path(run.out), None
         if started and not started.keeps:
             kept = haploop.logger.read(directory) if (directory / LOG).exists() else Recording({}, "", {})
-        scene = self._scene or LoadedScene(load_resolved(directory / SCENE), directory / SCENE)
+        scene = self._scene or load(directory / SCENE, plugins=sorted((directory / PLUGINS).glob("*.py")))
         self._result = Result(scene, read_summary(directory / SUMMARY), None if kept is not None else directory, kept)
         self._end()
         return self._result

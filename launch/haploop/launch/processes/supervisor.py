@@ -121,7 +121,7 @@ class Supervisor:
         loopback = "tcp://[::1]:0" if ":" in (spec.transport.host or "") else "tcp://127.0.0.1:0"
         here = with_host_of(self._server.address, loopback)
         keys = str(spec.transport.directory) if spec.transport.directory else None
-        run_directory.announce(sockets, here, scene.title, str(spec.out), keys)
+        run_directory.announce(sockets, here, scene.title, str(spec.out.resolve()), keys)
         run_number = len(run_directory.live_runs()) - 1
         self._prints = ShownPrints(spec.out.resolve() / PRINTS)
         start = {"address": here, "secret": secret, "prints": str(spec.out.resolve() / PRINTS)}
