@@ -193,7 +193,7 @@ def test_a_field_that_has_gone_with_its_element_takes_nothing_else_with_it(stand
     page.fill("[id='set-wall.stiffness']", "180")
     settable = {key: value for key, value in OPTIONS["settable"].items() if not key.startswith("dissipation.1")}
     stand_in.state(options={**OPTIONS, "settable": settable, "elements": OPTIONS["elements"][:1]})
-    expect(page.locator("#set-fields input")).to_have_count(4)
+    expect(page.locator("#set-fields input[type=text]")).to_have_count(4)
     assert page.input_value("[id='set-wall.stiffness']") == "180"
     expect(page.locator("[id='set-wall.stiffness']")).to_be_focused()
     expect(page.locator("#swap-element option")).to_have_text(["0: damping", "1: add one"])
@@ -294,3 +294,15 @@ def test_the_form_of_the_next_run_starts_from_its_own_element(stand_in, page):
     stand_in.state(run="another", options=own)
     expect(page.locator("#swap-kind")).to_have_value("unidirectional-inertia")
     assert (page.input_value("#swap-element"), page.input_value("#swap-mass")) == ("0", "0.03")
+
+
+@pytest.mark.slow
+def test_a_form_that_nobody_has_touched_follows_a_swap_made_elsewhere_and_one_begun_stays(stand_in, page):
+    after = {**OPTIONS, "elements": [OPTIONS["elements"][1], OPTIONS["elements"][1]]}
+    stand_in.state(options=after)
+    expect(page.locator("#swap-kind")).to_have_value("unidirectional-inertia")
+    page.select_option("#swap-kind", "damping")
+    page.fill("#swap-damping", "3")
+    stand_in.state(options={**after, "elements": after["elements"][:1]})
+    expect(page.locator("#swap-element option")).to_have_count(2)
+    assert (page.input_value("#swap-kind"), page.input_value("#swap-damping")) == ("damping", "3")

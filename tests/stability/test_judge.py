@@ -182,7 +182,7 @@ def test_the_force_ripple_is_that_of_the_last_quarter():
 
 @pytest.mark.parametrize("frequency", [0.1, 0.25, 0.375, 0.6])
 def test_a_slow_swing_that_grows_is_not_taken_for_one_that_dies_unfelt(frequency):
-    """What a hand feels at a quarter of a hertz is wide, and half a period may fall while its swing grows."""
+    """What a hand feels at a quarter of a hertz is wide, and half a period may fall while its growing."""
     for seconds in (1.0, 2.0, 4.0, 8.0, 16.0):
         t = np.arange(round(1000.0 * seconds)) / 1000.0
         for phase in np.arange(12.0) / 2.0:

@@ -19,7 +19,7 @@ from haploop.view.store.history import TRUE, WALL_BOOK, History
 from haploop.view.store.lod_series import LodSeries
 
 # Rows per point of the page at most; beyond, the rows are summed up in so many buckets per point.
-_ROWS_A_POINT, _BUCKETS_A_POINT = 3.0, 0.75
+_ROWS_A_POINT, _BUCKETS_A_POINT = 3.5, 0.75
 # Phase plots show so many periods of a swing, which is looked for in so much time, or all of that time; rows at most.
 _PERIODS, _PHASE_S, _MOST_ROWS = 2.0, 0.4, 8000
 PANELS = ("loops", "energy", "spectrum", "compare", "motion")

@@ -20,9 +20,9 @@ _WHY = {
     "no contact": "No tick of the last {window:g} s was in contact.",
     "swinging": "In the last {seen:.3g} s the position crossed its trend line {crossings} times by more than "
     "{swing_um:.3g} µm.",
-    "swing grows": "In the last {seen:.3g} s the position crossed its trend line {crossings} times, the second half "
+    "growing": "In the last {seen:.3g} s the position crossed its trend line {crossings} times, the second half "
     "{growth:.2f} times as wide as the first.",
-    "swing dies away": "In the last {seen:.3g} s the position crossed its trend line {crossings} times, the second "
+    "dying away": "In the last {seen:.3g} s the position crossed its trend line {crossings} times, the second "
     "half {growth:.2f} times as wide as the first.",
     "moving": "In the last {seen:.3g} s the position moved by {width_um:.3g} µm and crossed its trend line "
     "{crossings} times: a push of the hand, or a swing slower than can be told.",
@@ -99,7 +99,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     elif not inside[-window:].any():
         word = "no contact"
     elif crossings >= CROSSINGS:
-        word = "swing dies away" if growth < _DIES else "swing grows" if growth > _GROWS else "swinging"
+        word = "dying away" if growth < _DIES else "growing" if growth > _GROWS else "swinging"
     elif width > _REST * swing_m:
         word = "moving"
     else:

@@ -7,7 +7,7 @@ const WORDS = { lost: "not connected" };
 const VERDICTS = new Set(["steady", "limit-cycle", "growing", "diverged", "no-contact", "undecided"]);
 // What is seen in the last half second says nothing of stability: that is judged when the run has ended. Its signs:
 const SIGNS = {
-  swinging: "limit-cycle", "swing grows": "growing", "force ripples": "limit-cycle", "no contact": "no-contact",
+  swinging: "limit-cycle", growing: "growing", "force ripples": "limit-cycle", "no contact": "no-contact",
   "not finite": "diverged",
 };
 const NOT_YET = { awaited: "being judged", unknown: "not known" };

@@ -13,6 +13,9 @@ export class SwapForm {
     this.elements = [];
     this.known = "";
     this.fields = [];
+    // What people have begun to choose stays while the run goes on; else the form follows the elements at work.
+    this.isBegun = false;
+    byId("swap").addEventListener("input", () => (this.isBegun = true));
     byId("swap-element").addEventListener("change", () => this.takeElement());
     byId("swap-kind").addEventListener("change", () => this.takeKind());
     byId("swap").addEventListener("submit", (event) => {
@@ -34,6 +37,7 @@ export class SwapForm {
       byId("swap-element").value = "0";
       this.takeElement();
     }
+    else if (!this.isBegun) this.takeElement();
     else if (!byId("swap-kind").value) this.takeKind();
   }
 
@@ -73,6 +77,7 @@ export class SwapForm {
   /** Another run: nothing that was chosen for the last one stays. */
   forget() {
     this.known = "";
+    this.isBegun = false;
   }
 
   /** One order at a time: three clicks are one swap. */
@@ -86,6 +91,7 @@ export class SwapForm {
     byId("swap-do").disabled = true;
     const answer = await this.steering.order("swap", { swap: table, element: this.index }, { quiet: true });
     byId("swap-do").disabled = false;
+    this.isBegun = !answer.ok;
     if (!answer.ok) refuse(answer.text, this.fields, byId("swap-problem"));
   }
 }
