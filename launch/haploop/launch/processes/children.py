@@ -22,6 +22,8 @@ from haploop.protocol.transport.wire import Message
 # What a program of somebody else's is given after the end of its stdin to bring its device to rest.
 _TO_REST_S = 0.1
 MARK = "HAPLOOP_SEAT"
+# What the search for processes that have left the group may take.
+_GUARD_S = 5.0
 _GUARD = 'read now || sleep {0}; kill -9 $(grep -lsz "{1}" /proc/[0-9]*/environ | tr -dc "0-9\\n"); kill -9 0'
 _NAMED = {int(number) for number in signal.Signals}
 
@@ -154,10 +156,13 @@ class _Group:
         self.id = self._guard.pid
 
     def kill(self) -> None:
-        if self._guard.poll() is not None:  # the program has killed it
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(self.id, signal.SIGKILL)
-        self._guard.communicate(b"now\n")
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            if self._guard.poll() is None:
+                self._guard.communicate(b"now\n", timeout=_GUARD_S)
+                return
+        with contextlib.suppress(ProcessLookupError):  # the program has killed it, or it is held up
+            os.killpg(self.id, signal.SIGKILL)
+        self._guard.communicate()
 
 
 def _has_pidfd() -> bool:
