@@ -131,6 +131,8 @@ def test_the_sentences_follow_from_the_rankings():
     assert helped[1].endswith("adaptive damping and inertia.")
     worse = sentences([compared(adaptive_damping_and_inertia=2000.0, adaptive_inertia=500.0)])
     assert "adaptive inertia is no remedy" in worse[4]
+    assert "no element holds more than none" in told[0]
+    assert "no element" not in helped[0]
     harmful = sentences([compared(unidirectional_inertia=500.0)])
     assert "less on every loop" in harmful[3]
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH_IN, _ROW_IN, _BESIDE_IN = 11.0, 0.3, 1.9
-_GREY = "#999999"
+_GREY, _SHOWS = "#999999", 0.5
 _FORCES = {
     "ripple_N": ("ripple above 30 Hz, p-p", "|"),
     "extra_N": ("largest own force", "D"),
@@ -89,7 +89,8 @@ def _loops(ax: Axes, first: OfLoop, others: tuple[OfLoop, ...]) -> None:
 
 def _costs(ax: Axes, of: OfLoop) -> None:
     for row, kept in enumerate(of.rows):
-        shown = [each.rendered for each in kept.seeds if each.rendered.held_N_m]
+        # What hides its wall changes the force by as much as that is stiff, which says nothing of what it costs.
+        shown = [each.rendered for each in kept.seeds if each.rendered.held_N_m > _SHOWS * each.wall_N_m]
         if not shown:
             continue
         for place, (name, (_, marker)) in enumerate(_FORCES.items()):

@@ -103,6 +103,9 @@ def _compared(some: Family, other: Family, loops: dict[str, OfLoop]) -> dict[str
 
 def _first(of: OfLoop) -> str:
     found, tied = best(of)
+    without = next(row for row in of.rows if row.family == NOTHING.name)
+    if without is found or without in tied:
+        return f"no element holds more than none, {format_stiffness(held(without).value)}, as far as can be told"
     alike = f", not told from {join([row.family for row in tied])}" if tied else ", more than every other"
     return f"{found.family}, {format_stiffness(held(found).value)}{alike}"
 
@@ -139,8 +142,9 @@ def write(directory: Path, docs: Path) -> Path:
 
     Raises FigureError without matplotlib, OSError or ValueError for a comparison that cannot be read.
     """
-    files = sorted(directory.glob(f"*/{COMPARISON}"), reverse=True)
+    files = sorted(directory.glob(f"*/{COMPARISON}"))
     comparisons = [as_comparison(json.loads(file.read_text(encoding="utf-8"))) for file in files]
+    comparisons.sort(key=lambda told: told.loops[0].delay_s)
     if not comparisons:
         raise ValueError(f"{directory} has no {COMPARISON} in any directory below it; run haploop compare first.")
     write_figure(figure_of(comparisons), docs / FIGURE)

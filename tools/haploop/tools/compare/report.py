@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from haploop.tools.advise.families import NOTHING
 from haploop.tools.advise.report import format_stiffness
 from haploop.tools.compare.bench import MOST_N_M, Row, family_of
 from haploop.tools.compare.comparison import Comparison, OfLoop
@@ -28,6 +29,7 @@ READING = (
     "what is apart under two sets of seeds, tuning included. Bold: those not told from the best."
 )
 _TIED = "{0} renders most, {1}; it cannot be told apart from {2}."
+_NO_GAIN = "{0} renders most, {1}, but cannot be told apart from no element, {2}."
 _FIRST = "{0} renders most, {1}, and more than every other."
 _AGAIN = "{0} of {1} pairs that are apart are so under other seeds, tuning included; {2} are the other way round."
 
@@ -52,13 +54,17 @@ def task_sentence(told: Comparison) -> str:
     effort = told.effort
     return (
         f"Tried by {told.task}: {effort.cases} such conditions tune {2 * effort.points + 1} sets of parameters each, "
-        f"{effort.seeds} seeds of {effort.of_seed} others try the best one."
+        f"{effort.seeds} seeds of {effort.of_seed} others try the best one. So the walls are for "
+        "comparing, not for building: `haploop advise` tries one in some thousand cases."
     )
 
 
 def most_sentence(of: OfLoop) -> str:
     """Says what renders most, and what cannot be told from it under both sets of seeds."""
     found, tied = best(of)
+    without = next(row for row in of.rows if row.family == NOTHING.name)
+    if without is found or without in tied:
+        return _NO_GAIN.format(with_parameters(found), *(format_stiffness(held(row).value) for row in (found, without)))
     name, value = with_parameters(found), format_stiffness(held(found).value)
     return _TIED.format(name, value, join([row.family for row in tied])) if tied else _FIRST.format(name, value)
 
