@@ -12,13 +12,15 @@ from haploop.tools.advise.families import STABILIZERS, Family, applies, halton
 from haploop.tools.advise.subject import make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop, ranges
 from haploop.tools.advise.walls.limit import Query
-from haploop.tools.advise.walls.rendered import Rendered, Trying, rendered
-from haploop.tools.compare.bench import Effort, Job, Row, along, bench
+from haploop.tools.advise.walls.rendered import Rendered, Trying, rendered, tried
+from haploop.tools.advise.walls.trial import Store, Trial
+from haploop.tools.compare.bench import Effort, Row, along
 from haploop.tools.compare.comparison import AGAIN, TOLD, Comparison, Kept, OfLoop, as_comparison
 from haploop.tools.compare.conditions import draw
 from haploop.tools.compare.page import page, sentences
-from haploop.tools.compare.ranking import apart, best, held, ranking
+from haploop.tools.compare.ranking import best, held, ranking
 from haploop.tools.compare.report import comparison_data, report
+from haploop.tools.search.intervals import mean_interval
 from helpers.scenes.least import KINDS
 from helpers.shown import shown
 
@@ -165,12 +167,12 @@ def test_force_bounding_is_left_out_where_the_device_declares_no_damping():
 
 
 @pytest.mark.slow
-def test_inertia_renders_more_than_nothing_behind_a_cable_under_seeds_of_neither_set():
-    loop, effort = loop_of("premium15_cable"), Effort(points=3, cases=3, seeds=4, of_seed=2)
-    [nothing], [inertia] = (
-        bench(Job(loop, family.name, 2000.0, (3,), effort, sensitive=False))
-        for family in (families.NOTHING, families.BIDIRECTIONAL)
-    )
-    assert apart([nothing, inertia]) == {("bidirectional inertia", "nothing")}
-    assert nothing.values == ()
-    assert nothing.breaks
+def test_inertia_as_the_page_tuned_it_holds_more_than_nothing_behind_a_cable_under_seeds_of_neither_set():
+    loop, rungs = loop_of("premium15_cable"), tuple(2200.0 * times for times in (0.4, 0.7, 0.85, 1.0, 1.2, 1.45))
+    cases = [draw(ranges(loop), 3, seed, 3) for seed in range(1, 6)]
+    elements = (families.NOTHING.elements(()), families.BIDIRECTIONAL.elements((0.29e-3,)))
+    with Trial(Store()) as trial:
+        found = tried(trial, [Query(loop, some, each, rungs) for some in elements for each in cases], 0.08)
+    without, inertia = found[: len(cases)], found[len(cases) :]
+    more = [one.rendered.held_N_m - than.rendered.held_N_m for one, than in zip(inertia, without, strict=True)]
+    assert mean_interval(more).low > 0.0
