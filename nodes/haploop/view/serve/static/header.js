@@ -13,8 +13,8 @@ const SIGNS = {
 const NOT_YET = { awaited: "being judged", unknown: "not known" };
 
 /** What there is of a verdict, in a word. */
-export const told = ({ verdict, verdict_is: is, sight }) =>
-  NOT_YET[is] ?? (isJudged({ verdict, verdict_is: is }) ? verdict : sight?.word);
+export const told = ({ verdict, verdict_is: is, sight, phase }) =>
+  NOT_YET[is] ?? (isJudged({ verdict, verdict_is: is }) ? verdict : sight?.so_far && phase === "ended" ? "too short" : sight?.word);
 
 /** Whether there is a word that more than what was seen stands behind. */
 export const isJudged = ({ verdict, verdict_is: is }) => is === "judged" || verdict === "diverged";
