@@ -74,7 +74,7 @@ comparison: $(READY) ## compare every stabilizer on three devices and write docs
 
 docs: $(READY) ## make the documentation as a site in site/ (index.html); a warning is an error
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
-	@echo site/index.html
+	@echo 'site/index.html (to search it, too: python3 -m http.server -d site)'
 
 pictures: $(READY) ## make the pictures of README's walk anew (half a minute)
 	@$(BIN)/python docs/site/pictures.py docs/pictures
