@@ -20,7 +20,10 @@ def test_every_corner_of_an_example_is_a_scene_that_can_be_run(path: Path) -> No
 
 
 def test_the_examples_show_a_grid_a_boundary_and_seeds_with_tables_as_an_axis() -> None:
-    damping_stiffness, delay_boundary, elements = map(load, SWEEPS)
+    made = {path.stem: load(path) for path in SWEEPS}
+    damping_stiffness, delay_boundary, elements = (
+        made[name] for name in ("damping_stiffness", "delay_boundary", "elements")
+    )
     assert [len(axis.values) for axis in damping_stiffness.axes] == [24, 40]
     assert delay_boundary.bisect
     assert delay_boundary.bisect.axis == "wall.stiffness"

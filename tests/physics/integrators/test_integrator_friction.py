@@ -170,12 +170,16 @@ STIFF: dict[str, Any] = {
 @pytest.mark.parametrize("method", METHODS)
 def test_only_what_is_unstable_by_itself_is_noted(method):
     y = 1e-4 * np.sqrt(1e7 * (1 / 1e-3 + 1 / 0.05))
-    noted = notes(made(method, 0.1, **STIFF))
+
+    def unstable(**tables) -> list[str]:
+        return [note for note in notes(made(method, 0.1, **tables)) if "plant step" in note]
+
+    noted = unstable(**STIFF)
     assert bool(noted) == (method in ("euler", "semi-implicit-euler", "rk4"))
     if method == "euler":
         assert f"by {np.sqrt(1 + y**2):.7g} in every plant step" in noted[0]
-    assert not notes(made(method, 0.1))
-    assert not notes(made(method, 0.1, hand={"mass": 0.2, "grip": {"stiffness": 500, "damping": 5}}))
+    assert not unstable()
+    assert not unstable(hand={"mass": 0.2, "grip": {"stiffness": 500, "damping": 5}})
     if method in ONE_STEP:
         assert growth(made(method, 0.1, device={"mass": 0.05, "damping": 0})) == pytest.approx(1, abs=1e-12)
 
