@@ -39,8 +39,8 @@ round-trip delay: a device without a cable is taken as rigid, and without a dela
 renders. *Held* may be more than the wall where counts of the encoder are coarse: it reads deeper than the device is."""
 _MOST = "Most is rendered {0}."
 _TAKE = "Take the simplest of those that cannot be told from the best: {0}."
-_ALL, _NONE = "on every loop", "on none"
-_VERSUS = "{0} renders more than {1} {2}, less {3}, and cannot be told from it {4}"
+_WHERE = {"more": "renders more on {0}", "less": "renders less on {0}", "alike": "cannot be told from it on {0}"}
+_EVERYWHERE = {"more": "each of these loops", "less": "each of these loops", "alike": "any of these loops"}
 _HELPS, _MIXED = "adaptive inertia helps there", "adaptive inertia is no remedy"
 _NOT = "adaptive inertia does not help, as far as can be told"
 _HEADS = ("element", "parameter", "wall", "held", "contact", "ripple", "extra", "±20 %", "device ±20 %", "breaks first")
@@ -59,14 +59,13 @@ def sentences(comparisons: Sequence[Comparison]) -> list[str]:
     more, less = (any(each[place] for each in helps) for place in ("more", "less"))
     verdict = (_MIXED if less else _HELPS) if more else _NOT
     others = (NOTHING, DAMPING, BIDIRECTIONAL)
-    stands = "; it ".join(_of(UNIDIRECTIONAL, other, loops, other is NOTHING) for other in others)
+    stands = ". ".join(versus(UNIDIRECTIONAL, other, loops) for other in others)
     return [
         _MOST.format("; ".join(f"on {name}: {_first(of)}" for name, of in loops.items())),
         _TAKE.format("; ".join(f"on {name} {simplest(of)}" for name, of in loops.items())),
-        f"{_capital(versus(DAMPING, NOTHING, loops))}.",
-        f"{_capital(stands)}.",
-        f"{_capital(versus(ADAPTIVE_BOTH, ADAPTIVE_DAMPING, loops))}; by itself "
-        f"{versus(ADAPTIVE_INERTIA, NOTHING, loops)}: {verdict}.",
+        f"{versus(DAMPING, NOTHING, loops)}.",
+        f"{stands}.",
+        f"{versus(ADAPTIVE_BOTH, ADAPTIVE_DAMPING, loops)}. {versus(ADAPTIVE_INERTIA, NOTHING, loops)}: {verdict}.",
     ]
 
 
@@ -83,15 +82,10 @@ def simplest(of: OfLoop) -> str:
 
 def versus(some: Family, other: Family, loops: dict[str, OfLoop]) -> str:
     """Says where some family renders more than another, where less, and where it cannot be told from it."""
-    return _of(some, other, loops, True)
-
-
-def _of(some: Family, other: Family, loops: dict[str, OfLoop], named: bool) -> str:
     where = _compared(some, other, loops)
-    places = (_ALL if len(where[word]) == len(loops) else f"on {join(where[word])}" if where[word] else _NONE
-              for word in ("more", "less", "alike"))  # fmt: skip
-    words = _VERSUS.format(some.name, other.name, *places)
-    return words if named else words.removeprefix(f"{some.name} ")
+    places = {word: _EVERYWHERE[word] if len(names) == len(loops) else join(names) for word, names in where.items()}
+    told = "; it ".join(_WHERE[word].format(place) for word, place in places.items() if where[word])
+    return f"{_capital(some.name)} against {other.name}: it {told}"
 
 
 def _compared(some: Family, other: Family, loops: dict[str, OfLoop]) -> dict[str, list[str]]:
