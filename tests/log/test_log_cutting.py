@@ -77,6 +77,17 @@ def test_a_logger_whose_plant_is_ahead_when_it_joins_logs_the_controller_from_it
         np.testing.assert_array_equal(column, whole["/controller"][name][first:], err_msg=name)
 
 
+def test_a_logger_that_joins_before_the_controllers_first_block_expects_it_from_tick_0(sent):
+    """The plant's STATE may tell of a tick that the controller has answered, but not yet told of."""
+    plant, controller = sent
+    ends = list(accumulate(block["ticks"] for block in plant))
+    late = plant[JOINS:]
+    log = logged(late, controller, "c" * len(controller) + "p" * len(late))
+    whole = logged(plant, controller, "c" * len(controller) + "p" * len(plant))
+    for name, column in log["/controller"].items():
+        np.testing.assert_array_equal(column, whole["/controller"][name][ends[JOINS - 1] :], err_msg=name)
+
+
 class Reached(MemoryLog):
     """A log that looks, at every message, that it could be replayed if it were cut off there."""
 

@@ -57,14 +57,18 @@ class Logger:
     def count_wall_time(self) -> None:
         self._began = wall_clock.perf_counter()
 
-    def start(self, plant: dict[str, float], history: list[Block]) -> None:
-        """Begins with the plant's state and, when joining a run, the controller's last blocks."""
+    def start(self, plant: dict[str, float], history: list[Block], controller_tick: int = 0) -> None:
+        """Begins with the plant's state and, when joining a run, the controller's last blocks.
+
+        Args:
+            controller_tick: where the controller's blocks to come begin if it has sent none.
+        """
         self.count_wall_time()
         known = history[-1]["from_tick"] + history[-1]["ticks"] if history else 0
         self.tick = self._first_tick = max(int(plant["tick"]), known)
         self._plant = PlantBuffer(self.time.steps_per_tick, int(plant["tick"]))
         self._controller = ControllerBuffer(
-            history[0]["from_tick"] if history else self.tick, class_of(self._scene.wall)
+            history[0]["from_tick"] if history else controller_tick, class_of(self._scene.wall)
         )
         for block in history:
             self._buffer(block)

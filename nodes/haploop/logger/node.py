@@ -94,7 +94,7 @@ class LoggerNode:
             for role, frame in received:
                 self._check(role, frame)
                 if frame.name == "STATE":
-                    states[role] = frame.fields[1]
+                    states[role] = {"tick": frame.fields[0], **frame.fields[1]}
                 else:
                     early.append((role, frame))
             if not received:
@@ -105,7 +105,8 @@ class LoggerNode:
             self._client.poll()
             if (why := self._leave()) is not None:
                 raise Aborted(why or "The logger left before anything came.")
-        self.session.logger.start(states["plant"], states["controller"]["history"])
+        controller = states["controller"]
+        self.session.logger.start(states["plant"], controller["history"], controller["tick"])
         self._started = True
         for role, frame in early:
             self._take(role, frame)
