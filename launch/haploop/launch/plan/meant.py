@@ -1,4 +1,4 @@
-"""What is in order in a scene but cannot be meant: one rule each, with its condition and the sentence it says."""
+"""Rules of scenes that are in order but cannot be meant: one each, with its condition and the sentence it says."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What walls better than the true one would have taken on the same motion: from their difference follows the leak."""
+"""Energy that walls better than the true one would have taken on the same motion; the leak is the difference."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be told apart: two stabilizers whose difference, seed by seed, is surely not 0 under either set of seeds."""
+"""Rankings of stabilizers: two are apart whose difference, seed by seed, is surely not 0 under either set of seeds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a swap in mid-contact did to a loop: two verdicts, what the wall gave away and why, in words that follow."""
+"""Story of a swap in mid-contact: two verdicts, what the wall gave away and why, in words that follow from runs."""
 
 from __future__ import annotations
 

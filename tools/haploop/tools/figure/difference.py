@@ -1,4 +1,4 @@
-"""What two runs differ in: keys of their scenes, what came of them, and the tick at which they part."""
+"""Differences of two runs: keys of their scenes, what came of them, and the tick at which they part."""
 
 from __future__ import annotations
 

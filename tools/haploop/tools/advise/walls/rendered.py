@@ -1,4 +1,4 @@
-"""What a hand gets of a wall that is safe: stiffness as rendered, ripple, and the force that an element adds."""
+"""Rendering of a wall that is safe: stiffness at the hand, ripple, and the force that an element adds."""
 
 from __future__ import annotations
 
