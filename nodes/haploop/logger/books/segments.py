@@ -211,7 +211,7 @@ class ChainForms:
             which = 2 * np.searchsorted(found, kinds) + segments.is_stuck
             return loops.integrate(np.stack([*self._rates.values()]), forms, which, acting, rise)
         groups, result = segments.groups(), np.empty((len(self.names), *force.shape))
-        if not isinstance(groups[0][2], slice):  # a mask selects from whole arrays alone
+        if any(not isinstance(which, slice) for *_, which in groups):  # a mask selects from whole arrays alone
             acting, rise = [np.broadcast_to(of, force.shape) for of in acting], np.broadcast_to(rise, force.shape)
         for kinds, of, which in groups:
             made = [(self._rates[kind % 2 == 1], *self.forms(kind // 2, kind % 2 == 1)) for kind in kinds.tolist()]
