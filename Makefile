@@ -2,6 +2,8 @@
 PYTHON ?= python3
 UV ?= uv
 BIN := .venv/bin
+# One more than there are processors: some tests wait for processes of their own.
+WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
 SEEDS ?= 2000
 N ?= 50
 FROM ?= 0
@@ -23,14 +25,14 @@ demo: $(READY) ## tell how a wall buzzes, why, and what steadies it; the last li
 	@$(BIN)/haploop demo
 
 quick: $(READY) ## run the tests of scene, log, estimators, clock and physics in closed form (below 30 s)
-	@$(BIN)/pytest -q -n auto --dist worksteal --hypothesis-profile quick -m "not slow" \
+	@$(BIN)/pytest -q -n $(WORKERS) --dist worksteal --hypothesis-profile quick -m "not slow" \
 	  -k "not as_processes and not compiles" $(QUICK)
 
 test: $(READY) ## run the tests
-	@$(BIN)/pytest -q -n auto --dist worksteal -m "not slow"
+	@$(BIN)/pytest -q -n $(WORKERS) --dist worksteal -m "not slow"
 
 slow: $(READY) ## run the slow tests (that there are none is no failure: pytest then exits with 5)
-	@$(BIN)/pytest -q -n auto --dist worksteal -m slow || [ $$? -eq 5 ]
+	@$(BIN)/pytest -q -n $(WORKERS) --dist worksteal -m slow || [ $$? -eq 5 ]
 
 everywhere: $(READY) ## bits of every scene and the tests, whatever processor, CPython and dependencies (an hour; ONLY=name)
 	@PYTHONPATH=tests $(BIN)/python -m everywhere.command --only "$(ONLY)"
