@@ -220,7 +220,7 @@ def test_what_strangers_send_changes_no_bit_of_a_run_with_a_program_of_another_l
 @pytest.mark.parametrize(
     ("role", "name", "scene", "says"),
     [
-        ("controller", "controller.js", "fig6c.toml", "a wall with one damping"),
+        ("controller", "controller.js", "fig6c.toml", "a spring wall with one damping"),
         ("controller", "wall.c", "fig6b.toml", "a spring wall alone"),
         ("plant", "plant.js", "all_effects.toml", "knows nothing of"),
     ],
