@@ -10,8 +10,12 @@ import numpy as np
 
 from haploop.plant.chain.motion import ChainMotion
 from haploop.plant.line import Hold
+from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
+
+# For so many ticks of members in all.
+LOOPS = WhereItPays("haploop.plant.friction.projected_loops", 1_000_000)
 
 
 class ProjectedFrictionMotion(ChainMotion):
@@ -21,7 +25,7 @@ class ProjectedFrictionMotion(ChainMotion):
     Where f is enough v is 0.0 exactly, and a body that was at rest keeps its place to the bit. Stops and starts fall on
     plant steps, an error of order h in their times; in return members may differ in every number, bodies and friction
     included, and one that chatters costs no more than one at rest. Made for searches, where ``BatchFrictionMotion``
-    solves every stop exactly, member by member.
+    solves every stop exactly, member by member. It keeps no record.
 
     Args:
         scene: the stacked scene of the members.
@@ -38,9 +42,10 @@ class ProjectedFrictionMotion(ChainMotion):
         self._set_up()
 
     def _set_up(self) -> None:
-        size = len(self.state.z)
+        size, members = self.state.z.shape
         self._is_constant = bool((self._law[0] == self._law[1]).all())
-        self._moves, self._of_friction = np.delete(self._free.step, size + 1, axis=0), self._free.step[size + 1]
+        step = np.broadcast_to(self._free.step, (size + 4, size, members))
+        self._moves, self._of_friction = np.delete(step, size + 1, axis=0), step[size + 1].copy()
 
     def _most(self, speed: np.ndarray) -> np.ndarray:
         """Returns F(v), N."""
@@ -60,26 +65,36 @@ class ProjectedFrictionMotion(ChainMotion):
                    np.array([table.stribeck_velocity or np.inf for table in tables]))  # fmt: skip
 
     def advance(self, tick: int, holds: list[Hold]) -> Any:
-        interval, loads = self._begin(holds), self.loads(tick * self._n, (tick + 1) * self._n + 1)
-        states, v, size = interval.states, self._v, len(self.state.z)
-        at_ends, acting = np.empty((self._n, 2, states.shape[-1])), np.empty((size + 3, 1, states.shape[-1]))
-        acted, z, rises = np.empty((size + 3, *states.shape[1:])), states[0], loads[1:] - loads[:-1]
-        for i in range(self._n):
-            acting[:size, 0], acting[size], acting[-2], acting[-1] = z, interval.held[i, 0], loads[i], rises[i]
+        z, n, loads = self.state.z, self._n, self.loads(tick * self._n, (tick + 1) * self._n + 1)
+        states, held, at_ends = np.empty((n + 1, *z.shape)), np.empty((n, z.shape[1])), np.empty((n, 2, z.shape[1]))
+        states[0], first = z, 0
+        for count, force, _ in holds:
+            held[first : first + count] = force
+            first += count
+        if loops := self._is_constant and LOOPS.module_for(z.shape[1]):
+            loops.move(self._moves, self._of_friction, self._law[0], self._v, loads, held, states, at_ends)
+        else:
+            self._move(loads, held, states, at_ends)
+        sensed = self._sensor.after(self.state.sensed, states, held, at_ends, tick * n + 1)
+        self.state = self.state._replace(z=states[-1], sensed=sensed)
+        return self.x
+
+    def _move(self, loads: np.ndarray, held: np.ndarray, states: np.ndarray, at_ends: np.ndarray) -> None:
+        """Fills in the states at the end of every step, and friction in N and whether body 0 stops there."""
+        (size, members), v = states.shape[1:], self._v
+        acting, acted = np.empty((size + 3, 1, members)), np.empty((size + 3, size, members))
+        for i, z in enumerate(states[:-1]):
+            acting[:size, 0], acting[size], acting[-2], acting[-1] = z, held[i], loads[i], loads[i + 1] - loads[i]
             after = np.add.reduce(np.multiply(self._moves, acting, out=acted), out=states[i + 1])
             after += z
-            speed, most = z[v], self._most(z[v])
+            most = self._most(z[v])
             needed = after[v] / -self._of_friction[v]
             friction = np.minimum(np.maximum(needed, -most), most)
             after += self._of_friction * friction
             stops = friction == needed
             after[v][stops] = 0.0
-            np.copyto(after[0], z[0], where=stops & (speed == 0.0))
-            at_ends[i, 0], at_ends[i, 1] = friction, stops
-            z = after
-        at_ends[:, 0] *= 1.0 - at_ends[:, 1]
-        interval.comps[1:] = 0.0
-        return self._accept(tick, interval._replace(at_ends=at_ends))
+            np.copyto(after[0], z[0], where=stops & (z[v] == 0.0))
+            at_ends[i] = np.where(stops, 0.0, friction), stops
 
     def select(self, kept: np.ndarray) -> None:
         super().select(kept)

@@ -43,7 +43,9 @@ class HandForce:
         """Returns tau at the steps first ... last - 1, shape (last - first,) or (last - first, 1 or members)."""
         size = self._piece_steps
         pieces = range(first // size, (last - 1) // size + 1)
-        joined = np.concatenate([self._piece(index) for index in pieces])
+        joined = (
+            self._piece(pieces[0]) if len(pieces) == 1 else np.concatenate([self._piece(index) for index in pieces])
+        )
         start = first - pieces.start * size
         return joined[start : start + last - first]
 

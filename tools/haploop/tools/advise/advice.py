@@ -31,6 +31,7 @@ HOLDS_MORE = (
     "A {0} ({1}), which renders less than its wall, may hold more: {2:.2g} N/mm in the loop as described. It was not "
     "tried in every corner; `haploop compare` tells what it holds."
 )
+NO_OTHER = "With none of these, at seven parameters each, does the loop as described bear {0:.2g} N/mm: {1}."
 SAFE_MEANS = (
     "at rest, or swinging by less than a hand feels, in position (Israr, Choi and Tan 2006) and in force (what would "
     "move device and hand by as much)"
@@ -88,7 +89,8 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
     assumed = [of for of in subject.assumed if is_number(value_at(loop, of.key))]
     keys = [of.key for of in assumed]
     found = search(loop, keys, trial, stage)
-    hidden = [HOLDS_MORE.format(of.family.name, of.family.words(of.values), of.held_N_m / 1e3) for of in found.hidden]
+    told = [NO_OTHER.format(found.simple_N_m / 1e3, "; ".join(each.name for each in found.others))] * bool(found.others)
+    told += [HOLDS_MORE.format(of.family.name, of.family.words(of.values), of.held_N_m / 1e3) for of in found.hidden]
     stage("changes of the device")
     altered, ideal, otherwise = changes(loop), idealised(loop), assumed_otherwise(loop, keys)
     loops = [loop, *altered.values(), *ideal.values(), *otherwise.values()]
@@ -112,7 +114,7 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
             notes.append(_PLUGIN)
     return Advice(
         name=subject.name,
-        notes=(*subject.notes, *notes, *hidden),
+        notes=(*subject.notes, *notes, *told),
         is_ideal=is_ideal(loop),
         tried_by=task_words(loop),
         uncertain=ranges(loop, keys),

@@ -21,7 +21,7 @@ from haploop.tools.advise.families import (
     first_choices,
     together,
 )  # fmt: skip
-from haploop.tools.advise.others import Hidden, hiding, worth_more
+from haploop.tools.advise.others import Choice, Hidden, hiding, others_bearing, worth_more
 from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, Ranges, attack, corner, every_case, ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, Limit, Query, ladder, limits
 from haploop.tools.advise.walls.trial import Failure, Trial, Tried
@@ -36,15 +36,11 @@ _SOFTER = (0.8, 0.62, 0.48, 0.35, 0.25, 0.15, 0.08, 0.03)
 # Parameters that are tried in every corner, by their places among those that bear as much in the loop as described;
 # what suits a device of half the mass is smaller.
 _MANY, _WIDE, _ONE = (0.0, 0.5, 1.0), (-1.0, 0.0, 1.0), (0.5,)
-# Of the other elements every second parameter is tried.
-_EVERY = 2
 # A wall that does not withstand the attack is lowered by this, so often at most.
 _LOWER, _TIMES = 0.97, 60
 # So much stiffer walls have to withstand it, too: where a count lies in the hold is chance, and differs with each.
 _BEYOND = (1.0, 1.02, 1.04)
 _STEADY = ("steady", "no-contact")
-
-Choice = tuple[Family, Values]
 
 
 @dataclass(frozen=True)
@@ -73,6 +69,7 @@ class Found:
         as_assumed: the best, and how stiff, were every assumed number right; None where nothing is assumed.
         breaks: the softest wall known not to bear everything, and what it does; None where none was found.
         cases: how many it was tried in, attack included.
+        others: elements that bear no wall of ``simple_N_m`` as described, the best of the simple ones.
         hidden: elements that render less than their wall, and may hold more than any other.
     """
 
@@ -82,6 +79,8 @@ class Found:
     as_assumed: Best | None
     breaks: tuple[float, Failure] | None
     cases: int
+    others: tuple[Family, ...] = ()
+    simple_N_m: float = 0.0
     hidden: tuple[Hidden, ...] = ()
 
 
@@ -107,9 +106,10 @@ def search(
     pairs = together(_equals(known, DAMPING)[-1], _equals(known, UNIDIRECTIONAL)[-1])
     known |= nominal([(BOTH, values) for values in pairs], rungs)
     stage("every other element")
-    sparse = {family: first_choices(family, loop)[::_EVERY] for family in OTHERS}
-    known |= nominal([(family, values) for family in OTHERS for values in sparse[family]], rungs)
-    good = worth_more(known, WORTH)
+    borne = [limit.stiffness_N_m for limit in known.values()]
+    simple = max(LEAST_N_M, WORTH * known[NOTHING, ()].stiffness_N_m, *borne)
+    known |= nominal(others_bearing(loop, trial, simple), rungs)
+    good = worth_more(known, simple)
     more = [(family, values) for family in good for values in beside(_equals(known, family)[0])]
     known |= nominal([choice for choice in more if choice not in known], rungs)
     hidden = hiding(loop, trial, alone, WORTH * max(limit.stiffness_N_m for limit in known.values()))
@@ -127,11 +127,9 @@ def search(
     stage("the attack")
     stiffness, broken = _attacked(loop, trial, advised, top, of)
     cases = len(_BEYOND) * len(attack(of)) + len(every_case(of))
-    shown = [advised if each is best else each for each in bests]
-    for family in (each for each in OTHERS if each not in good):
-        values = _equals(known, family)[0]
-        shown.append(Best(family, values, known[family, values]))
-    return Found(tuple(shown), advised, stiffness, as_assumed, broken, cases, hidden)
+    shown = tuple(advised if each is best else each for each in bests)
+    others = tuple(family for family in OTHERS if family not in good)
+    return Found(shown, advised, stiffness, as_assumed, broken, cases, others, simple, hidden)
 
 
 def _equals(known: dict[Choice, Limit], family: Family) -> list[Values]:

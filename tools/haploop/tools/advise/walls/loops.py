@@ -15,10 +15,13 @@ from haploop.launch.batch.loop import BatchLoop
 from haploop.launch.batch.stacking import is_batchable, stacked, structures
 from haploop.plant.friction.projected import ProjectedFrictionMotion
 from haploop.plant.plant import Plant
-from haploop.protocol.scene.scene import Scene
+from haploop.plant.where_it_pays import WhereItPays
+from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.protocol.ticks import Timebase
 
 Kinds = Mapping[str, type[Element]]
+# Elements without a memory and their parameter, of which 0 is no element: walls with any of them move as one array.
+_PLAIN = {"damping": "damping", "bidirectional-inertia": "mass", "unidirectional-inertia": "mass"}
 
 
 class Seen(NamedTuple):
@@ -41,10 +44,11 @@ class Loops(BatchLoop):
     """Scenes of one structure, moved together; friction is projected, see ``ProjectedFrictionMotion``."""
 
     def __init__(self, scenes: Sequence[Scene], kinds: Kinds) -> None:
-        scene, rows = stacked([replace(one, friction=None) for one in scenes]), BatchRecorder()
+        scene, rows = stacked([replace(one, friction=None) for one in _alike(scenes)]), BatchRecorder()
         time = Timebase.from_scene(scene)
         super().__init__(scene, time, Controller(scene, time, dict(kinds), rows), rows, len(scenes))
         if scenes[0].friction is not None:
+            WhereItPays.may_wait = True
             self._motion = ProjectedFrictionMotion.of(scenes, scene, time)
         self._limit_m, self._tick = scene.diverged_beyond, 0
 
@@ -56,7 +60,7 @@ class Loops(BatchLoop):
                 x[row] = self._motion.x
                 self._work(self._tick + row)
         columns = [row.columns for row in self._rows.take_rows()]
-        self._motion.take_record(self._tick, positions_only=True)
+        self._motion.forget_record()
         self._tick += ticks
         measured, command = (
             np.array([np.broadcast_to(each[name], x.shape[1:]) for each in columns]) for name in ("x", "total")
@@ -92,13 +96,34 @@ class LoneLoop:
         """Has no others to leave out."""
 
 
+def is_plain(elements: Sequence[ElementTable]) -> bool:
+    """Tells whether these are plain elements, each once and in their order, or none."""
+    names = [each.name for each in elements]
+    return names == [name for name in _PLAIN if name in names] and all(each.acts == "in-contact" for each in elements)
+
+
 def make_loops(scenes: Sequence[Scene], kinds: Kinds) -> list[tuple[list[int], Loops | LoneLoop]]:
     """Returns the indices of the scenes that move together, with their loops."""
     groups: dict[Any, list[int]] = {}
-    for index, shape in enumerate(structures([replace(scene, friction=None) for scene in scenes])):
+    for index, shape in enumerate(structures([_shape(scene) for scene in scenes])):
         smooth = is_batchable(replace(scenes[index], friction=None))
         groups.setdefault((shape, scenes[index].friction is None) if smooth else index, []).append(index)
+    return [(group, LoneLoop(scenes[key], kinds) if isinstance(key, int) else Loops([scenes[i] for i in group], kinds))
+            for key, group in groups.items()]  # fmt: skip
+
+
+def _shape(scene: Scene) -> Scene:
+    """Returns the scene without what need not be alike: friction, and plain elements."""
+    return replace(scene, friction=None, dissipation=() if is_plain(scene.dissipation) else scene.dissipation)
+
+
+def _alike(scenes: Sequence[Scene]) -> list[Scene]:
+    """Returns the scenes of a group with the same plain elements, of which some do nothing: forces keep their bits."""
+    names = [name for name in _PLAIN if any(each.name == name for scene in scenes for each in scene.dissipation)]
+    if not names or not is_plain(scenes[0].dissipation):
+        return list(scenes)
+    nothing = {name: ElementTable(name=name, parameters={_PLAIN[name]: 0.0}) for name in names}
     return [
-        (group, LoneLoop(scenes[key], kinds) if isinstance(key, int) else Loops([scenes[i] for i in group], kinds))
-        for key, group in groups.items()
+        replace(scene, dissipation=tuple((nothing | {each.name: each for each in scene.dissipation}).values()))
+        for scene in scenes
     ]

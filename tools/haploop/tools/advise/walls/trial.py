@@ -19,7 +19,7 @@ from haploop.launch.spec import OutputError
 from haploop.protocol.scene.scene import ElementTable, Scene, Wall
 from haploop.tools.advise.walls.cases import LASTS_S, Case, slowness
 from haploop.tools.advise.walls.felt import Buzz, Threshold, buzz, felt_force_N
-from haploop.tools.advise.walls.loops import LoneLoop, Loops, make_loops
+from haploop.tools.advise.walls.loops import LoneLoop, Loops, is_plain, make_loops
 from haploop.tools.executor.executors import Executor, InlineExecutor, make_executor, map_parallel
 from haploop.tools.linear.linearity import installed_kinds
 
@@ -169,7 +169,8 @@ class Trial:
         together: dict[str, list[str]] = {}
         late = {id(loop): slowness(loop) for loop in {id(job.loop): job.loop for job in new.values()}.values()}
         for key, job in new.items():
-            kinds = [element.name for element in job.walls[0].elements]
+            elements = job.walls[0].elements
+            kinds = "plain" if is_plain(elements) else [element.name for element in elements]
             together.setdefault(repr((kinds, job.loop.clock, late[id(job.loop)])), []).append(key)
         parts: list[list[str]] = []
         for keys in together.values():
