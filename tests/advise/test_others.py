@@ -3,22 +3,18 @@
 from haploop.tools.advise import others
 from haploop.tools.advise.advice import HOLDS_MORE
 from haploop.tools.advise.families import (
-    ADAPTIVE_DAMPING,
     ADAPTIVE_INERTIA,
-    BIDIRECTIONAL,
     COUPLING,
     HIDING,
-    NOTHING,
     OTHERS,
     STABILIZERS,
+    first_choices,
 )
-from haploop.tools.advise.others import hiding, worth_more
-from haploop.tools.advise.subject import make_subject
-from haploop.tools.advise.walls.cases import make_loop
+from haploop.tools.advise.others import hiding, others_bearing, worth_more
 from haploop.tools.advise.walls.limit import Limit, Query
 from haploop.tools.advise.walls.rendered import Rendered, Trying
-from haploop.tools.advise.walls.trial import Store, Trial
-from helpers.scenes.least import KINDS
+from haploop.tools.advise.walls.trial import Failure, Store, Trial
+from helpers.scenes.presets import loop_of
 
 
 def test_no_element_is_both_compared_by_its_wall_and_known_to_hide_it_and_few_are_neither():
@@ -29,28 +25,41 @@ def test_no_element_is_both_compared_by_its_wall_and_known_to_hide_it_and_few_ar
     }  # fmt: skip
 
 
-def test_another_element_goes_on_only_where_it_bears_more_than_every_simple_one_and_a_tenth_more_than_none():
-    stiffness = dict.fromkeys(OTHERS, 1000.0) | {NOTHING: 1000.0, BIDIRECTIONAL: 1500.0}
+def test_another_element_goes_on_only_where_it_bears_more_than_every_simple_one_and_two_of_them_at_most():
+    def going_on(*stiffness_N_m: float):
+        return worth_more(
+            {(family, (1.0,)): Limit(k, k) for family, k in zip(OTHERS, stiffness_N_m, strict=False)}, 1500.0
+        )
 
-    def going_on(**changed: float):
-        found = {family: changed.get(family.name.replace(" ", "_"), value) for family, value in stiffness.items()}
-        return worth_more({(family, (1.0,)): Limit(value, value) for family, value in found.items()}, 1.1)
+    assert going_on() == going_on(1400.0, 1500.0) == []
+    assert going_on(1600.0, 1400.0, 1300.0) == [OTHERS[0]]
+    assert going_on(1600.0, 1700.0, 1650.0) == [OTHERS[1], OTHERS[2]]
 
-    assert going_on() == []
-    assert going_on(adaptive_damping=1400.0) == []
-    assert going_on(adaptive_damping=1600.0) == [ADAPTIVE_DAMPING]
-    assert going_on(adaptive_damping=1600.0, adaptive_inertia=1700.0) == [ADAPTIVE_INERTIA, ADAPTIVE_DAMPING]
-    assert going_on(adaptive_damping=1050.0, bidirectional_inertia=1000.0) == []
+
+def test_each_parameter_of_every_other_element_is_asked_for_a_wall_as_stiff_as_the_best_simple_one_bears(monkeypatch):
+    loop, asked = loop_of("premium15_cable"), []
+
+    def of_jobs(self, jobs):
+        asked.extend(jobs)
+        kinds = [job.walls[0].elements[0].name for job in jobs]
+        return [[None if kind == "adaptive-inertia" else Failure("a case", 1.0, gone=False)] for kind in kinds]
+
+    monkeypatch.setattr(Trial, "of_jobs", of_jobs)
+    with Trial(Store()) as trial:
+        found = others_bearing(loop, trial, 2100.0)
+    assert {job.walls[0].stiffness_N_m for job in asked} == {2100.0}
+    assert len(asked) == sum(len(first_choices(family, loop)) for family in OTHERS)
+    assert found == [(ADAPTIVE_INERTIA, values) for values in first_choices(ADAPTIVE_INERTIA, loop)]
 
 
 def test_a_coupling_is_told_where_it_holds_more_than_all_others_and_not_by_the_stiffness_of_its_wall(monkeypatch):
-    asked = make_subject("premium15_cable", None, None, None, [], KINDS)
-    loop = make_loop(asked.scene, asked.has_task)
+    loop = loop_of("premium15_cable")
 
     def held(trial: Trial, queries: list[Query], tolerance: float):
         return [Trying(1e6, 1e6, Rendered(held_N_m=100.0 * place), 1e9, None) for place, _ in enumerate(queries)]
 
     monkeypatch.setattr(others, "tried", held)
+    monkeypatch.setattr(Trial, "of_jobs", lambda self, jobs: [[None] for _ in jobs])
     with Trial(Store()) as trial:
         [found] = hiding(loop, trial, 2000.0, 400.0)
         assert hiding(loop, trial, 2000.0, 500.0) == ()

@@ -1,5 +1,6 @@
 """Many loops side by side do what one run does, and a wall is tried in all its cases."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,36 +8,55 @@ import pytest
 
 from haploop.launch.stability.judge import judge_scene
 from haploop.plant.chain.chain import Chain
+from haploop.plant.friction import projected
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import ElementTable, Scene
-from haploop.tools.advise.subject import make_subject
 from haploop.tools.advise.walls.cases import HOLDS, Case, corner, make_loop, ranges
 from haploop.tools.advise.walls.loops import LoneLoop, Loops, make_loops
 from haploop.tools.advise.walls.trial import Job, Store, Trial, Tried
 from haploop.tools.linear.one_tick import OneTickMap
 from helpers.scenes.least import KINDS, scene
-
-
-def loop_of(device: str, *overrides: str) -> Scene:
-    asked = make_subject(device, None, None, None, overrides, KINDS)
-    return make_loop(asked.scene, asked.has_task)
+from helpers.scenes.presets import loop_of
 
 
 def placed(loop: Scene, case: Case, stiffness: float, *elements: ElementTable) -> Scene:
     return replace(with_value(case.scene(loop), "wall.stiffness", stiffness), dissipation=elements)
 
 
-DAMPING = ElementTable(name="damping", parameters={"damping": 1.0})
+DAMPING, INERTIA = (ElementTable(name=name, parameters={key: value}) for name, key, value in (
+    ("damping", "damping", 1.0), ("unidirectional-inertia", "mass", 0.002)))  # fmt: skip
 
 
-def test_without_friction_loops_side_by_side_have_the_bits_of_each_alone():
+def test_without_friction_loops_side_by_side_whatever_simple_elements_they_have_keep_the_bits_of_each_alone():
     loop = replace(loop_of("touch"), friction=None)
-    scenes = [placed(loop, Case(hold), k, DAMPING) for hold in (0.3, 1.0) for k in (300.0, 900.0)]
-    together = Loops(scenes, KINDS).go_on(400)
+    some = ((), (DAMPING,), (DAMPING, INERTIA))
+    scenes = [placed(loop, Case(hold), 900.0, *elements) for hold in (0.3, 1.0) for elements in some]
+    [(group, loops)] = make_loops(scenes, KINDS)
+    assert group == [*range(len(scenes))]
+    together = loops.go_on(400)
     for place, one in enumerate(scenes):
         alone = LoneLoop(one, KINDS).go_on(400)
         assert np.array_equal(together.x[:, place], alone.x[:, 0])
         assert np.array_equal(together.command[:, place], alone.command[:, 0])
+
+
+@pytest.mark.slow
+def test_projected_friction_in_machine_code_has_the_bits_of_numpy_also_when_members_leave(monkeypatch):
+    pytest.importorskip("numba")
+    monkeypatch.setattr(projected.LOOPS, "asked", 0)
+    for device in ("omega3", "premium15_cable"):
+        loop = loop_of(device)
+        of = ranges(loop)
+        scenes = [placed(loop, Case(1.0, corner(of, n)), 90.0 * n, DAMPING) for n in range(1, 101)]
+        found = []
+        for pays in (math.inf, 0.0):
+            monkeypatch.setattr(projected.LOOPS, "pays", pays)
+            loops = Loops(scenes, KINDS)
+            before = loops.go_on(150)
+            loops.select(np.arange(100) % 3 > 0)
+            found.append((before, loops.go_on(150)))
+        assert projected.LOOPS.module() is not None
+        assert all(np.array_equal(*pair) for some in zip(*found, strict=True) for pair in zip(*some, strict=True))
 
 
 def test_projected_friction_follows_the_exact_one_and_ever_closer_with_shorter_steps():

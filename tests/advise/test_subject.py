@@ -1,0 +1,87 @@
+"""The subject of an advice: names, hands, delays, what a device file assumes, absurd numbers."""
+
+import pytest
+
+from haploop.launch.scene.bundled import bundled
+from haploop.launch.scene.file import load
+from haploop.launch.scene.mistakes import SceneError
+from haploop.protocol.scene.paths import value_at
+from haploop.tools.advise.subject import DEFAULT_HAND, InvalidRequest, apply_events, assumptions, make_subject
+from helpers.scenes.least import KINDS
+from helpers.scenes.presets import SCENES
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("premum15", None, None, None), "did you mean premium15?"),
+        (("touch", "choi", None, None), "did you mean choi2022?"),
+        (("touch", None, None, "kalmann"), "did you mean kalman?"),
+    ],
+)
+def test_a_wrong_name_is_answered_with_the_nearest(arguments, words):
+    device, hand, delay, estimator = arguments
+    with pytest.raises(InvalidRequest, match=words.replace("?", r"\?")):
+        make_subject(device, hand, delay, estimator, (), KINDS)
+
+
+@pytest.mark.parametrize("delay", ["2", "600 ms"])
+def test_a_delay_that_no_task_outlasts_is_refused_and_a_forgotten_unit_is_suspected(delay):
+    with pytest.raises(InvalidRequest, match=r'advice is given up to 0.5 s.*write "[0-9.]+ ms" for milliseconds'):
+        make_subject("touch", None, delay, None, [], KINDS)
+
+
+def test_a_preset_gets_a_hand_and_says_so():
+    asked = make_subject("touch", None, "1 ms", None, [], KINDS)
+    assert not asked.has_task
+    assert DEFAULT_HAND in asked.notes[0]
+    assert asked.scene.clock.round_trip_delay == 0.001
+
+
+def test_another_hand_keeps_the_force_of_the_scene():
+    asked = make_subject(str(SCENES / "fig6a.toml"), "fu_cavusoglu_x", None, None, [], KINDS)
+    assert value_at(asked.scene, "hand.grip.stiffness") == 379.5
+    assert value_at(asked.scene, "hand.force.value") == -0.65
+
+
+def test_what_the_events_of_a_scene_change_is_changed_from_the_start():
+    done = apply_events(load(SCENES / "swap.toml"))
+    assert [table.name for table in done.dissipation] == ["unidirectional-inertia"]
+    assert not done.event
+
+
+def test_what_a_device_file_assumes_is_known_and_what_a_file_built_on_it_measures_is_not():
+    files = bundled("devices")
+    assert {of.key for of in assumptions(files["omega3"])} == {"device.mass", "device.damping", "friction.kinetic"}
+    assert {of.key for of in assumptions(files["falcon"])} == {"device.mass", "device.damping", "friction.kinetic"}
+    assert not assumptions(files["premium15"])
+    of_cable = {of.key for of in assumptions(files["premium15_cable"])}
+    assert {"transmission.stiffness", "transmission.motor_mass"} <= of_cable
+    assert "friction.kinetic" not in of_cable
+
+
+def test_a_device_of_ones_own_is_taken_as_the_presets_are_and_a_scene_with_a_wall_as_a_task(tmp_path):
+    mine = tmp_path / "mine.toml"
+    mine.write_text('extends = "omega3.toml"\n[device]\nmass = 0.3  # weighed\n')
+    (tmp_path / "omega3.toml").write_text(bundled("devices")["omega3"].read_text())
+    asked = make_subject(str(mine), None, None, None, [], KINDS)
+    assert not asked.has_task
+    assert asked.scene.device.mass == 0.3
+    assert {of.key for of in asked.assumed} == {"device.damping", "friction.kinetic"}
+    assert make_subject("fig6c", None, None, None, [], KINDS).has_task
+
+
+@pytest.mark.parametrize(
+    ("tables", "words"),
+    [
+        ("[device]\nmass = 0.0", "device.mass is 0.0. It must be above 0 kg"),
+        ("[device]\nmass = -0.1", "device.mass is -0.1. It must be above 0 kg"),
+        ("[device]\nmass = 1e308", "device.mass is 1e\\+308. It must be at most"),
+        ("[device]\nmass = 0.1\n[friction]\nkinetic = 1e308", "friction.kinetic is 1e\\+308. It must be at most"),
+        ("[device]\nmass = 0.1\n[encoder]\nresolution = nan", "encoder.resolution is nan. It must be a finite number"),
+    ],
+)
+def test_a_device_of_absurd_numbers_is_refused_with_what_was_expected(tmp_path, tables, words):
+    (tmp_path / "mine.toml").write_text(tables)
+    with pytest.raises(SceneError, match=words):
+        make_subject(str(tmp_path / "mine.toml"), None, None, None, [], KINDS)
