@@ -90,37 +90,37 @@ def search(
     """Finds the element that bears the stiffest wall in all cases, assumed keys halved and doubled, and how stiff."""
     first = tuple(Case(hold) for hold in FIRST_HOLDS)
 
-    def nominal(choices: Sequence[Choice], rungs: tuple[float, ...]) -> dict[Choice, Limit]:
-        queries = [Query(loop, family.elements(values), first, rungs) for family, values in choices]
+    def nominal(choices: Sequence[Choice], rungs: tuple[float, ...], least_N_m: float) -> dict[Choice, Limit]:
+        queries = [Query(loop, family.elements(values), first, rungs, least_N_m) for family, values in choices]
         return dict(zip(choices, limits(trial, queries, ROUGH), strict=True))
 
     stage("the wall alone")
-    known = nominal([(NOTHING, ())], ladder(10.0, 1e5, 1.6))
+    known = nominal([(NOTHING, ())], ladder(10.0, 1e5, 1.6), LEAST_N_M)
     alone = max(10.0 * LEAST_N_M, known[NOTHING, ()].stiffness_N_m)
     stage("one element")
-    rungs = ladder(alone / 2.0, alone * 8.0, 1.4)
-    known |= nominal([(family, values) for family in SINGLE for values in first_choices(family, loop)], rungs)
+    rungs = ladder(alone / 2.0, alone * 8.0, 1.4), alone / 2.0
+    known |= nominal([(family, values) for family in SINGLE for values in first_choices(family, loop)], *rungs)
     more = [(family, values) for family in SINGLE for values in beside(_equals(known, family)[0])]
-    known |= nominal([choice for choice in more if choice not in known], rungs)
+    known |= nominal([choice for choice in more if choice not in known], *rungs)
     stage("two elements")
     pairs = together(_equals(known, DAMPING)[-1], _equals(known, UNIDIRECTIONAL)[-1])
-    known |= nominal([(BOTH, values) for values in pairs], rungs)
+    known |= nominal([(BOTH, values) for values in pairs], *rungs)
     stage("every other element")
     borne = [limit.stiffness_N_m for limit in known.values()]
     simple = max(LEAST_N_M, WORTH * known[NOTHING, ()].stiffness_N_m, *borne)
-    known |= nominal(others_bearing(loop, trial, simple), rungs)
+    known |= nominal(others_bearing(loop, trial, simple), *rungs)
     good = worth_more(known, simple)
     more = [(family, values) for family in good for values in beside(_equals(known, family)[0])]
-    known |= nominal([choice for choice in more if choice not in known], rungs)
+    known |= nominal([choice for choice in more if choice not in known], *rungs)
     hidden = hiding(loop, trial, alone, WORTH * max(limit.stiffness_N_m for limit in known.values()))
-    some = (NOTHING, *SINGLE, BOTH, *good)
+    some = (*SINGLE, BOTH, *good)
     stage("every corner")
     of, measured = ranges(loop, assumed), ranges(loop)
     bests = _in_corners(loop, trial, known, of, _MANY if of == measured else _WIDE, some)
     as_assumed = None if of == measured else _advised(_in_corners(loop, trial, known, measured, _ONE, some))
     best = _advised(bests)
     values, safe = _refined(loop, trial, best, of)
-    described = known.get((best.family, values)) or nominal([(best.family, values)], rungs)[best.family, values]
+    described = known.get((best.family, values)) or nominal([(best.family, values)], *rungs)[best.family, values]
     advised = Best(best.family, values, described, safe)
     stage("softer walls")
     top = _softer(loop, trial, advised, of)
@@ -156,26 +156,31 @@ def _in_corners(
     places: Sequence[float],
     families: Sequence[Family],
 ) -> list[Best]:
-    """Returns the best of some families; those worth it with their limit in every corner, at the holds tried first.
+    """Returns the wall alone and the best of some families, with limits in every corner, at the holds tried first.
 
     Of parameters that bear as much in the loop as described those at these places, from the smallest, 0, to the
-    largest, 1; below 0 the next that are half of the smallest or less.
+    largest, 1; below 0 the next that are half of the smallest or less. None is tried below what makes it worth having.
     """
-    bests: list[Best] = []
+    cases, alone = every_case(of, FIRST_HOLDS), known[NOTHING, ()]
+
+    def query(choice: Choice, least_N_m: float) -> Query:
+        family, values = choice
+        top = known[choice].stiffness_N_m or LEAST_N_M
+        rungs = ladder(max(least_N_m, top / 3.0), max(least_N_m, top) * 1.06, 1.5)
+        return Query(loop, family.elements(values), cases, rungs, least_N_m)
+
+    bests = [Best(NOTHING, (), alone, limits(trial, [query((NOTHING, ()), LEAST_N_M)], ROUGH / 2.0)[0])]
+    least = max(LEAST_N_M, WORTH * bests[0].safe.stiffness_N_m) if bests[0].safe else LEAST_N_M
     candidates: list[Choice] = []
     for family in families:
         equals = _equals(known, family)
         bests.append(Best(family, equals[0], known[family, equals[0]]))
-        if not family.parts or bests[-1].nominal.stiffness_N_m > WORTH * bests[0].nominal.stiffness_N_m:
+        if bests[-1].nominal.stiffness_N_m > WORTH * alone.stiffness_N_m:
             smaller = max((each for each in _values(known, family) if _is_half(each, equals[0])), default=equals[0])
             some = (equals[round(place * (len(equals) - 1))] if place >= 0.0 else smaller for place in places)
             candidates += dict.fromkeys((family, values) for values in some)
-    cases = every_case(of, FIRST_HOLDS)
-    queries = []
-    for family, values in candidates:
-        top = known[family, values].stiffness_N_m or LEAST_N_M
-        queries.append(Query(loop, family.elements(values), cases, ladder(top / 3.0, top * 1.06, 1.5)))
-    safe = dict(zip(candidates, limits(trial, queries, ROUGH / 2.0), strict=True))
+    found = limits(trial, [query(each, least) for each in candidates], ROUGH / 2.0)
+    safe = {choice: limit for choice, limit in zip(candidates, found, strict=True) if limit.stiffness_N_m}
     for place, best in enumerate(bests):
         of_family = {values: limit for (family, values), limit in safe.items() if family is best.family}
         if of_family:

@@ -22,12 +22,14 @@ class Query:
 
     Attributes:
         ladder: stiffnesses in N/m that are tried first, rising.
+        least_N_m: where a wall so soft fails, the search ends: how much softer the limit is does not matter.
     """
 
     loop: Scene
     elements: tuple[ElementTable, ...]
     cases: tuple[Case, ...]
     ladder: tuple[float, ...]
+    least_N_m: float = LEAST_N_M
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,8 @@ class Limit:
     """The limit of a wall's stiffness.
 
     Attributes:
-        stiffness_N_m: the largest that bears all cases, as do all softer ones that were tried; 0 where none does.
+        stiffness_N_m: the largest that bears all cases, as do all softer ones that were tried; 0 where none does, or
+            none as stiff as asked for.
         fails_N_m: the softest that does not; infinite where none was found.
         failure: what that one does.
         borne_above_N_m: stiffer ones that bear all cases all the same.
@@ -69,7 +72,7 @@ def limits(trial: Trial, queries: Sequence[Query], tolerance: float) -> list[Lim
         ]
         for index, failures in zip(asking, trial.of_jobs(jobs), strict=True):
             tried[index].update(zip(wanted[index], failures, strict=True))
-        wanted = [_next(known, tolerance) for known in tried]
+        wanted = [_next(known, tolerance, query.least_N_m) for known, query in zip(tried, queries, strict=True)]
     return [_limit(known) for known in tried]
 
 
@@ -80,13 +83,15 @@ def _limit(known: dict[float, Failure | None]) -> Limit:
     return Limit(max((k for k in borne if k < fails), default=0.0), fails, known.get(fails), above)
 
 
-def _next(known: dict[float, Failure | None], tolerance: float) -> list[float]:
+def _next(known: dict[float, Failure | None], tolerance: float, least_N_m: float) -> list[float]:
     found = _limit(known)
     low, high = found.stiffness_N_m, found.fails_N_m
+    if high <= least_N_m:
+        return []
     if high == math.inf:
         return sorted({min(MOST_N_M, low * factor) for factor in (2.0, 4.0)}) if low < MOST_N_M else []
     if not low:
-        return sorted({max(LEAST_N_M, high / factor) for factor in (4.0, 2.0)}) if high > LEAST_N_M else []
+        return sorted({max(least_N_m, high / factor) for factor in (4.0, 2.0)})
     if high <= low * (1.0 + tolerance):
         return []
     parts = min(_BETWEEN + 1, math.ceil(math.log(high / low) / math.log1p(tolerance)))
