@@ -32,6 +32,13 @@ HOLDS_MORE = (
     "tried in every corner; `haploop compare` tells what it holds."
 )
 NO_OTHER = "With none of these, at seven parameters each, does the loop as described bear {0:.2g} N/mm: {1}."
+READING = (
+    "Every corner: what is uncertain 20 % more or less, what is assumed half or twice, in all combinations, or 32 of "
+    "more; a dash where an element allows no tenth more than the wall alone; * where stiffer walls bear what a softer "
+    "one does not. Changes and assumptions: of the loop as described, with the element advised or with none, "
+    "whichever bears more. All these at holds of 0.3, 1 and 3 times the task's; the first line, at more holds and "
+    "under attack, may be lower."
+)
 SAFE_MEANS = (
     "at rest, or swinging by less than a hand feels, in position (Israr, Choi and Tan 2006) and in force (what would "
     "move device and hand by as much)"
@@ -157,6 +164,7 @@ def advice_data(told: Advice, sentences: list[str]) -> AdviceData:
         "headline": told.headline,
         "recommended": {"element": best.family.name, "stiffness_N_m": told.found.stiffness_N_m, "parameters": sizes},
         "safe_means": SAFE_MEANS,
+        "reading": READING,
         "advice": " ".join(sentences),
         **_as_data(replace(told, scene=None)),
     }

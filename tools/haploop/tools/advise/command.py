@@ -6,6 +6,7 @@ import contextlib
 import json
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from haploop.launch.scene.events import elements_of, try_out
@@ -46,7 +47,7 @@ def advise(
         except InvalidRequest as error:
             leave(str(error), WRONG_USE)
         try_out(elements_of(asked.scene), kinds)
-        print_notes(asked.scene, kinds)
+        asked = replace(asked, notes=(*print_notes(asked.scene, kinds), *asked.notes))
         out = _output(out, asked.name)
         store = Store(out / WALLS)
         try:

@@ -8,7 +8,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from haploop.tools.advise.advice import Advice
+from haploop.tools.advise.advice import READING, Advice
 from haploop.tools.advise.changes import CLOSE
 from haploop.tools.advise.search import ROUGH, WORTH, Best
 from haploop.tools.advise.walls.limit import Limit
@@ -21,13 +21,6 @@ _NOTHING_BREAKS = "nothing that was tried"
 # A changed limit tells something where it differs by more than how closely it is known.
 _TELLS = 1.2
 _NO_CHANGE = "no single change that was tried gains a fifth"
-_READING = (
-    "Every corner: what is uncertain 20 % more or less, what is assumed half or twice, in all combinations, or 32 of "
-    "more; a dash where a simpler element bears as much; * where stiffer walls bear what a "
-    "softer one does not. Changes and assumptions: of the loop as described, with the element advised or with none, "
-    "whichever bears more. All these at holds of 0.3, 1 and 3 times the task's; the first line, at more holds and "
-    "under attack, may be lower."
-)
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
 # What is assumed, how much that costs, and what to measure.
 _ASSUMED = "{0}, published nowhere: the wall bears half and twice of {1}. {2}"
@@ -46,7 +39,7 @@ def report(told: Advice) -> RenderableType:
         *(Text(note, style="dim") for note in told.notes),
         Text(f"Tried by {told.tried_by}, in {told.found.cases} cases; {told.runs} runs.", style="dim"),
         _elements(told),
-        Text(_READING, style="dim"),
+        Text(READING, style="dim"),
         _limits(told),
         _changes(told),
     ]
