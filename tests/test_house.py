@@ -116,15 +116,11 @@ def test_a_circle_is_found_however_it_is_imported(source: str, tmp_path: Path, m
 
 def foreign_private_names(source: str) -> set[str]:
     """Private attributes that a module reads without defining them itself; those of a NamedTuple are public."""
-    tree, public = ast.parse(source), {"_replace", "_asdict", "_fields", "_make", "_exit"}
-    defined = {
-        node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
-    }
-    attributes = [node for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
-    of_self = [node for node in attributes if ast.unparse(node.value) in ("self", "cls", "super()")]
-    defined |= {node.attr for node in of_self}
-    private = {node.attr for node in attributes if node.attr.startswith("_") and not node.attr.startswith("__")}
-    return private - defined - public
+    nodes, public = [*ast.walk(ast.parse(source))], {"_replace", "_asdict", "_fields", "_make", "_exit"}
+    defined = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)}
+    private = [node for node in nodes if isinstance(node, ast.Attribute) and re.match("_(?!_)", node.attr)]
+    own = {node.attr for node in private if ast.unparse(node.value) in ("self", "cls", "super()")}
+    return {node.attr for node in private} - defined - own - public
 
 
 def test_no_module_reads_the_private_names_of_another() -> None:

@@ -3,7 +3,6 @@
 import json
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -18,14 +17,6 @@ from haploop.tools.cost.measure import Measurement
 from haploop.tools.cost.reference import reference_for, statistics
 from haploop.tools.trajectory import trajectory
 from helpers.scenes.cost_scene import SMOOTH, exact_reference, outcomes
-
-
-@pytest.fixture
-def smooth(tmp_path: Path) -> Path:
-    """A scene file without anything that switches."""
-    path = tmp_path / "smooth.toml"
-    path.write_text(SMOOTH)
-    return path
 
 
 @pytest.mark.parametrize(("method", "order"), [("euler", 1), ("semi-implicit-euler", 1), ("implicit-midpoint", 2)])

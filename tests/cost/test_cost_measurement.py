@@ -2,7 +2,6 @@
 
 import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,14 +16,6 @@ from haploop.tools.cost.measure import Measurement
 from haploop.tools.cost.times import Store
 from helpers.data.costs import fake_cost
 from helpers.scenes.cost_scene import SMOOTH, count_stages, exact_reference
-
-
-@pytest.fixture
-def smooth(tmp_path: Path) -> Path:
-    """A scene file without anything that switches."""
-    path = tmp_path / "smooth.toml"
-    path.write_text(SMOOTH)
-    return path
 
 
 def test_a_finished_measurement_is_not_made_again(smooth, tmp_path, monkeypatch):

@@ -31,7 +31,8 @@ def bits_of(variant: Variant, python: Path, scenes: Sequence[str] = ()) -> dict[
 
 def tested(variant: Variant, python: Path, tests: Sequence[str]) -> tuple[bool, str]:
     """Returns whether the tests pass in a variant, and what pytest says in its last line."""
-    command = [str(python), "-m", "pytest", "-q", "-n", "auto", "-m", "not slow", "-p", "no:cacheprovider", *tests]
+    options = ["-q", "-n", "auto", "--dist", "worksteal", "-p", "no:cacheprovider", "-m"]
+    command = [str(python), "-m", "pytest", *options, "not slow", *tests]
     done = _run(variant, command)
     failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
     last = (done.stdout.strip().splitlines() or [""])[-1].strip("= ")
@@ -51,7 +52,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="make everywhere", description=__doc__)
     parser.add_argument("--only", default="", help="variants whose names have this in them")
     parser.add_argument("--no-tests", action="store_true", help="compare bits alone")
-    parser.add_argument("tests", nargs="*", default=["tests"], help="tests to run")
+    parser.add_argument("tests", nargs="*", help="tests to run instead of those of each variant")
     options = parser.parse_args()
     folder = ROOT / "runs" / "everywhere"
     folder.mkdir(parents=True, exist_ok=True)
@@ -62,20 +63,20 @@ def main() -> int:
     expected = bits_of(first, Path(sys.executable))
     for variant in (each for each in (*of_the_machine(), *of_installations()) if options.only in each.name):
         print(f"{variant.name} ...", file=sys.stderr, flush=True)
-        python = python_of(variant, folder)
-        if isinstance(python, str):
-            results[variant.name] = {"bits": python, "tests": "–"}
-            continue
+        words = "–"
         try:
+            python = python_of(variant, folder)
+            if isinstance(python, str):
+                results[variant.name] = {"bits": python, "tests": words}
+                continue
             found = bits_of(variant, python)
             same = sum(found.get(name) == digest for name, digest in expected.items())
             bits, passed = f"{same} of {len(expected)}", same == len(expected)
+            if not options.no_tests:
+                is_passed, words = tested(variant, python, options.tests or variant.tests)
+                passed &= is_passed
         except (RuntimeError, ValueError, subprocess.TimeoutExpired) as error:
             bits, passed = f"failed: {error}", False
-        words = "–"
-        if not options.no_tests:
-            is_passed, words = tested(variant, python, options.tests)
-            passed &= is_passed
         good &= passed
         results[variant.name] = {"bits": bits, "tests": words}
         (folder / "results.json").write_text(json.dumps(results, indent=1), encoding="utf-8")

@@ -9,15 +9,25 @@ import sys
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[2]
 # Kernels of OpenBLAS: the oldest of 64 bits, and those of three families of processors.
 KERNELS = ("Prescott", "Haswell", "Zen", "SkylakeX")
-
 # What a variant chooses, and no environment of its own accord.
 CHOSEN = ("OPENBLAS_CORETYPE", "OPENBLAS_NUM_THREADS", "NPY_DISABLE_CPU_FEATURES", "GLIBC_TUNABLES")
-_EXTRAS = ("plot", "pandas", "parquet", "view", "dev")
+EVERY_TEST = ("tests",)
+# Those that calculate, in one process: what starts processes, serves pages or reads files does nothing that the kernels
+# of a processor could round otherwise.
+CALCULATING = tuple(
+    f"tests/{folder}"
+    for folder in (
+        *("advise", "arrays", "compare", "cost", "dissipate", "estimators", "linear", "paper", "physics", "search"),
+        "stability",
+    )
+)
 _NEED = re.compile(r"([\w-]+)(?:\[[\w,-]+\])?>=([\d.]+)")
 
 
@@ -29,12 +39,14 @@ class Variant:
         environment: variables that are set for it.
         python: version of CPython, such as "3.12"; "" for the present one.
         resolution: "locked", or versions that the resolver chooses: "lowest-direct", "highest".
+        tests: folders of those that may come to something else in it.
     """
 
     name: str
     environment: Mapping[str, str] = field(default_factory=dict[str, str])
     python: str = ""
     resolution: str = "locked"
+    tests: tuple[str, ...] = EVERY_TEST
 
 
 def of_the_machine() -> list[Variant]:
@@ -42,14 +54,14 @@ def of_the_machine() -> list[Variant]:
     from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__  # pyright: ignore
 
     present = [name for name in __cpu_dispatch__ if __cpu_features__.get(name)]
-    found = [Variant("default"), *(Variant(f"OpenBLAS {name}", {"OPENBLAS_CORETYPE": name}) for name in KERNELS)]
-    if present:
-        found.append(Variant("NumPy without vector units", {"NPY_DISABLE_CPU_FEATURES": " ".join(present)}))
-    found += [Variant(f"{count} threads of BLAS", {"OPENBLAS_NUM_THREADS": str(count)}) for count in (1, 8)]
-    if sys.platform == "linux":
-        off = "glibc.cpu.hwcaps=-AVX2,-AVX2_Usable,-FMA,-FMA_Usable,-FMA4,-AVX512F,-ERMS"
-        found.append(Variant("C library without FMA", {"GLIBC_TUNABLES": off}))
-    return found
+    off = "glibc.cpu.hwcaps=-AVX2,-AVX2_Usable,-FMA,-FMA_Usable,-FMA4,-AVX512F,-ERMS"
+    chosen = {
+        **{f"OpenBLAS {name}": {"OPENBLAS_CORETYPE": name} for name in KERNELS},
+        **({"NumPy without vector units": {"NPY_DISABLE_CPU_FEATURES": " ".join(present)}} if present else {}),
+        **{f"{count} threads of BLAS": {"OPENBLAS_NUM_THREADS": str(count)} for count in (1, 8)},
+        **({"C library without FMA": {"GLIBC_TUNABLES": off}} if sys.platform == "linux" else {}),
+    }
+    return [Variant("default"), *(Variant(name, of, tests=CALCULATING) for name, of in chosen.items())]
 
 
 def of_installations() -> list[Variant]:
@@ -63,19 +75,20 @@ def of_installations() -> list[Variant]:
 def python_of(variant: Variant, folder: Path) -> Path | str:
     """Returns the interpreter of a variant, installed into a folder where it is another; or why there is none.
 
-    Installs by the pip of the interpreter that this one's virtual environment was made of, as the Makefile does.
+    Installs by the pip of the interpreter that this one's virtual environment was made of, as the Makefile does;
+    RuntimeError with the last words of what did not work.
     """
     if not variant.python and variant.resolution == "locked":
         return Path(sys.executable)
     base = shutil.which(f"python{variant.python}") if variant.python else _base()
-    if base is None:
-        return f"python{variant.python} is not on the path"
+    if base is None or subprocess.run([base, "-V"], capture_output=True, check=False).returncode:
+        return f"there is no python{variant.python}"
     venv = folder / variant.name.replace(" ", "-")
     python = venv / "bin" / "python"
     lowest = folder / "lowest.txt"
     lowest.write_text("".join(f"{pin}\n" for pin in lowest_direct()), encoding="utf-8")
     install = [_base(), "-m", "pip", "--python", str(python), "-q", "--disable-pip-version-check", "install"]
-    own = ["-e", f".[{','.join(_EXTRAS)}]"]
+    own = ["-e", f".[{','.join(_project()['optional-dependencies'])}]"]
     commands = {
         "locked": [["--require-hashes", "-r", "requirements.lock"], ["--no-deps", "--no-build-isolation", "-e", "."]],
         "lowest-direct": [["-c", str(lowest), *own]],
@@ -85,7 +98,7 @@ def python_of(variant: Variant, folder: Path) -> Path | str:
     for command in (made, *([*install, *arguments] for arguments in commands[variant.resolution])):
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
         if done.returncode:
-            return f"it cannot be installed: {(done.stderr.strip().splitlines() or ['?'])[-1]}"
+            raise RuntimeError(f"it cannot be installed: {(done.stderr.strip().splitlines() or ['?'])[-1]}")
     return python
 
 
@@ -93,9 +106,13 @@ def _base() -> str:
     return str(Path(sys.base_prefix) / "bin" / f"python{sys.version_info.major}.{sys.version_info.minor}")
 
 
+@cache
+def _project() -> dict[str, Any]:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
 def lowest_direct() -> list[str]:
-    """Returns the lowest version that is allowed of every direct dependency, as pins."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    extras = [need for extra in _EXTRAS for need in project["optional-dependencies"][extra]]
-    found = [_NEED.match(need) for need in (*project["dependencies"], *extras)]
+    """Returns the lowest version that is allowed of every direct dependency, those of extras among them, as pins."""
+    extras = [need for needs in _project()["optional-dependencies"].values() for need in needs]
+    found = [_NEED.match(need) for need in (*_project()["dependencies"], *extras)]
     return [f"{each[1]}=={each[2]}" for each in found if each]

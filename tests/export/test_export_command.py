@@ -15,7 +15,7 @@ from haploop.logger import read
 from haploop.logger.log.writer import Log
 from haploop.tools.cli.app import app
 from helpers.data.logs import cut, swapped_run
-from helpers.live.launched import on_a_disk_of
+from helpers.live.launched import first_and_slowly, on_a_disk_of
 
 FORMATS = ("csv", "npz", "parquet", "json-mcap")
 
@@ -68,7 +68,7 @@ def test_a_place_that_cannot_be_written_to_is_refused(run: Path, tmp_path: Path)
     refused(export(run, "--to", "npz", "--force"), 2, f"{run / 'log.npz'} exists already")
 
 
-@pytest.mark.parametrize("to", FORMATS)
+@pytest.mark.parametrize("to", first_and_slowly(*FORMATS))
 def test_a_disk_that_fills_leaves_nothing_behind(to: str, tmp_path: Path) -> None:
     needs(to)
     run = swapped_run(tmp_path / "out", 3_000, hard=False)

@@ -1,6 +1,8 @@
-"""The run that the runs of these tests are compared with."""
+"""The run that the runs of these tests are compared with, and a scene with the brake of a plugin."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import pytest
 
@@ -9,7 +11,7 @@ from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.logger import read
 from haploop.logger.log.recording import Recording
-from helpers.live.launched import SCENE
+from helpers.live.launched import SCENE, SCENES
 
 
 @pytest.fixture(scope="session")
@@ -19,3 +21,10 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     out = tmp_path_factory.mktemp("undisturbed")
     run_in_process(load(SCENE, ["duration=30"], kinds), kinds, out=out)
     return read(out)
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(f'extends = "{SCENES / "fig6a.toml"}"\n[[dissipation]]\nkind = "brake"\nacts = "always"\n')
+    return path

@@ -20,26 +20,8 @@ from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.protocol.transport.prints import NodeOutput
 from helpers.live.launched import HAPLOOP, PATIENCE_S, SCENES, command, first_and_slowly, wait_for
+from helpers.scenes.brake import source
 
-PLUGIN = """
-import logging, os, subprocess, sys, threading
-from typing import Annotated
-from haploop.controller.dissipation import Element, Quantity
-{at_import}
-
-class Brake(Element):
-    kind = "brake"
-    damping: Annotated[float, Quantity("N s/m", at_least=0)] = 0.05
-
-    def __post_init__(self):
-        self.tick = -1
-        {at_making}
-
-    def force(self, motion):
-        self.tick += 1
-        {at_each_tick}
-        return -self.damping * motion.v
-"""
 SETS = ("duration=0.3", "run.verdict=window", 'dissipation=[{kind="brake", acts="always"}]')
 MARKED = re.compile(r"controller(, tick \d+)?: ")
 KINDS = {
@@ -59,16 +41,16 @@ KINDS = {
 }  # fmt: skip
 
 
-def write_plugin(directory: Path, at_import: str, at_making: str, at_each_tick: str) -> Path:
+def write_plugin(directory: Path, *statements: str) -> Path:
     path = directory / "brake.py"
-    path.write_text(PLUGIN.format(at_import=at_import, at_making=at_making, at_each_tick=at_each_tick))
+    path.write_text(source(*statements))
     return path
 
 
 @pytest.fixture(scope="module")
 def silent(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The digest of the run whose element prints nothing."""
-    plugin = write_plugin(tmp_path_factory.mktemp("silent"), "pass", "pass", "pass")
+    plugin = write_plugin(tmp_path_factory.mktemp("silent"))
     kinds = registry() | load_plugin(plugin)
     return run_in_process(load(SCENES / "fig6a.toml", SETS, kinds), kinds)["trajectory_sha256"]
 
@@ -111,14 +93,14 @@ def test_the_last_lines_of_a_run_that_fails_are_shown_however_much_came_before(r
     run = running("--plugin", str(plugin), scene=SCENES / "fig6a.toml", sets=SETS, pace=())
     run.end(1)
     assert "controller, tick 200: " in run.stderr
-    assert "line 17: print('flood')" in run.stderr  # where in the element's own code
+    assert "line 20: print('flood')" in run.stderr  # where in the element's own code
     assert "Element 0 (brake) gave no force at tick 200: ZeroDivisionError" in run.stderr
     assert run.stderr.count("flood") < 80
 
 
 @pytest.mark.parametrize("kind", first_and_slowly("everywhere", "binary", "raw"))
 def test_a_run_in_one_process_keeps_its_answer_to_itself_too(kind, tmp_path, silent):
-    plugin = write_plugin(tmp_path, *(("pass", "pass", "pass") if kind == "raw" else KINDS[kind]))
+    plugin = write_plugin(tmp_path, *(() if kind == "raw" else KINDS[kind]))
     sets = [word for each in SETS for word in ("--set", each)]
     scene, out = str(SCENES / "fig6a.toml"), str(tmp_path / "out")
     done = subprocess.run(

@@ -16,27 +16,16 @@ from haploop.launch.scene.mistakes import SceneError
 from haploop.logger import read
 from haploop.logger.log import LogError
 from haploop.tools.figure.data import FigureError, RunData
+from helpers.scenes.brake import source
 
 FIG6C = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
-BRAKE = '''
-from typing import Annotated
-from haploop.controller.dissipation import Element, Motion, Quantity
-
-class Brake(Element):
-    """A force against the motion."""
-    kind = "brake"
-    gain: Annotated[float, Quantity("N s/m", at_least=0)]
-
-    def force(self, motion: Motion):
-        return -self.gain * motion.v
-'''
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made")
-    (folder / "brake.py").write_text(BRAKE)
-    sets = ["duration=0.3", "run.verdict=window", 'dissipation=[{kind="brake",gain=0.1}]']
+    (folder / "brake.py").write_text(source())
+    sets = ["duration=0.3", "run.verdict=window", 'dissipation=[{kind="brake",damping=0.1}]']
     run(prepare(FIG6C, sets, [folder / "brake.py"], folder / "run"), in_process=True)
     return folder / "run"
 
@@ -88,11 +77,11 @@ def test_the_scene_of_a_run_is_that_of_its_log_whatever_became_of_the_file_besid
 
 def test_a_scene_is_shown_without_the_plugin_it_names_and_not_repeated_without_it(directory):
     [plugin] = (directory / "plugins").iterdir()
-    plugin.write_text(plugin.read_text().replace("-self.gain", "-2 * self.gain"))
+    plugin.write_text(plugin.read_text().replace("-self.damping", "-2 * self.damping"))
     with pytest.raises(ReplayError, match="is no longer what the run was made with"):
         replay(directory)
     plugin.unlink()
-    assert RunData.from_directory(directory).scene.dissipation[0].parameters == {"gain": 0.1}
+    assert RunData.from_directory(directory).scene.dissipation[0].parameters == {"damping": 0.1}
     with pytest.raises(ReplayError, match="is missing; the run cannot be repeated without its plugin"):
         replay(directory)
 

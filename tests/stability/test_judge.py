@@ -77,6 +77,7 @@ def test_the_chatter_of_a_coarse_encoder_is_a_limit_cycle_and_that_of_a_fine_one
     assert word(**pressed(encoder=fine, wall={"position": 0.0, "stiffness": 800.0})) == "steady"
 
 
+@pytest.mark.slow
 def test_friction_that_holds_the_device_is_rest():
     assert word(**pressed(friction={"kinetic": 0.3})) == "steady"
 

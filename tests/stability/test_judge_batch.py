@@ -40,7 +40,7 @@ def rubbing() -> list[Scene]:
 
 
 FAMILIES: dict[str, Callable[[], list[Scene]]] = {
-    "plain": lambda: shipped("fig6a", [20.0, 80.0, 200.0, 3000.0]),
+    "plain": lambda: shipped("fig6a", [20.0, 200.0, 3000.0]),
     "inertia": lambda: shipped("fig6c", [20.0, 60.0, 150.0]),
     "trembling": trembling,
     "friction": rubbing,
@@ -67,7 +67,7 @@ def test_a_scene_may_ask_for_the_cheap_verdict_and_others_of_its_batch_are_judge
     mixed = [by_window(scene) if index % 2 else scene for index, scene in enumerate(pushed)]
     results = run_batch(mixed, registry(), fewest=2)
     assert ["stability" in result for result in results] == [True, False, True, False]
-    assert results[::2] == run_batch(pushed, registry(), fewest=2)[::2]
+    assert results[::2] == run_batch(pushed[::2], registry(), fewest=2)
 
 
 def test_one_loop_that_is_left_of_its_batch_is_judged_alone():

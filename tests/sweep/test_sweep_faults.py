@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import signal
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +11,7 @@ import pyarrow.parquet
 import pytest
 
 from haploop.tools.sweep.table import TableError, read
+from helpers.live.in_process import ask
 from helpers.live.launched import Launched, alive, processes, wait_for
 from helpers.scenes.sweep_files import PRESS, sweep_file, swept
 
@@ -165,30 +164,18 @@ def test_a_directory_that_holds_something_else_is_refused(launched: Callable[...
     ],
 )
 def test_what_is_not_installed_is_named_before_anything_is_started(
-    missing: str, options: list[str], said: str, tmp_path: Path
+    missing: str, options: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "hidden" / missing).mkdir(parents=True)
-    (tmp_path / "hidden" / missing / "__init__.py").write_text(f"raise ModuleNotFoundError('no {missing}')")
-    command = [
-        sys.executable,
-        "-m",
-        "haploop.tools.cli",
-        "sweep",
-        str(sweep_file(tmp_path)),
-        "--out",
-        str(tmp_path / "o"),
-    ]
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path / "hidden")}
-    run = subprocess.run([*command, *options], capture_output=True, text=True, env=environment)
-    assert run.returncode == 2
-    assert said in run.stderr
-    assert "Traceback" not in run.stderr
+    monkeypatch.setitem(sys.modules, missing, None)
+    answer = ask("sweep", str(sweep_file(tmp_path)), "--out", str(tmp_path / "o"), *options)
+    assert (answer.status, answer.broken()) == (2, "")
+    assert said in answer.stderr
 
 
-def test_a_number_of_workers_below_one_is_refused(launched: Callable[..., Launched], tmp_path: Path) -> None:
-    run = launched("sweep", str(sweep_file(tmp_path)), "--workers", "0")
-    run.end(2)
-    assert "--workers must be at least 1" in run.stderr
+def test_a_number_of_workers_below_one_is_refused(tmp_path: Path) -> None:
+    answer = ask("sweep", str(sweep_file(tmp_path)), "--workers", "0", "--out", str(tmp_path / "o"))
+    assert answer.status == 2
+    assert "--workers must be at least 1" in answer.stderr
 
 
 @pytest.mark.slow

@@ -151,7 +151,8 @@ def test_the_memory_of_a_history_stays_bounded_over_a_million_ticks():
         history.append_plant_block(tick, {"x": block, "v": block, "force": block})
         history.append_ticks(tick, columns, at_work)
         history.append_energy(tick, {"wall.true": ticks, "damping.true": ticks, "residual": ticks, "hand_work": ticks})
-        sizes[tick] = size_bytes(history)
+        if tick in (99_000, 999_000):
+            sizes[tick] = size_bytes(history)
     assert sizes[999_000] < 1.25 * sizes[99_000]
     assert history.first_tick == 0
     assert history.end_tick == 1_000_000

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from helpers.data.damage import damage
 from helpers.live.in_process import Answer, ask
+from helpers.scenes.brake import source
 
 SCENE = Path(__file__).parents[3] / "launch" / "scenes" / "fig6c.toml"
 # What stands in place of a word or of its value.
@@ -45,18 +46,6 @@ LINES = (
     "swap damping damping=0.8 --element 0 --at 1.5",
     "set wall.stiffness=100 --at 1.5 --json",
 )
-_BRAKE = '''
-from typing import Annotated
-from haploop.controller.dissipation import Element, Motion, Quantity
-
-class Brake(Element):
-    """A force against the motion."""
-    kind = "brake"
-    gain: Annotated[float, Quantity("N s/m", at_least=0)] = 0.05
-
-    def force(self, motion: Motion):
-        return -self.gain * motion.v
-'''
 
 
 def drop(rng: random.Random, words: list[str]) -> None:
@@ -101,7 +90,7 @@ class MutatedWords:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        (folder / "brake.py").write_text(_BRAKE, encoding="utf-8")
+        (folder / "brake.py").write_text(source(), encoding="utf-8")
         rows = "\n".join(f"{k / 1000:.3f},{0.01 * k * k:.6g}" for k in range(200))
         self._recording = f"t (s),x (mm)\n{rows}\n".encode()
         with contextlib.chdir(folder):

@@ -13,6 +13,15 @@ from haploop.protocol.scene.scene import Scene
 KINDS = registry()
 LEAST: dict[str, Any] = {"title": "least", "duration": 1.0, "device": {"mass": 0.01, "damping": 0.1}}
 WALL = {"position": -0.06, "stiffness": 150.0}
+# A device that a hand presses into a wall, with a delay; for ``scene``.
+PRESSED: dict[str, Any] = {
+    "duration": 0.3,
+    "seed": 5,
+    "device": {"mass": 0.01, "damping": 0.1, "velocity": -0.05},
+    "hand": {"mass": 0.01, "stiffness": 10.0, "force": {"kind": "constant", "value": -0.5}},
+    "wall": {**WALL, "position": -1e-3},
+    "clock": {"round_trip_delay": 0.0013},
+}
 
 
 def scene(**tables: Any) -> Scene:

@@ -75,7 +75,7 @@ def test_books_go_on_from_a_packed_state_to_the_same_bits(
     resolved, name = busy(tables), "book_batch" if of_batch else "book"
     made, calls = calls_of(monkeypatch, Books, "__init__"), calls_of(monkeypatch, Books, name)
     if of_batch:
-        together([with_value(resolved, "wall.stiffness", 100.0 + i) for i in range(5)])
+        together([with_value(resolved, "wall.stiffness", 100.0 + i) for i in range(2)])
     else:
         run(resolved)
     monkeypatch.undo()

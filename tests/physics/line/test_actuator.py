@@ -16,7 +16,7 @@ from haploop.plant.plant import Plant
 from haploop.protocol.scene import effects
 from haploop.protocol.ticks import Timebase
 from helpers.runs.captured import in_blocks, of_the_scene, run
-from helpers.scenes.least import WALL, scene, typed
+from helpers.scenes.least import PRESSED, scene, typed
 
 FORCES = st.floats(-1e3, 1e3)
 
@@ -52,15 +52,6 @@ def test_rounding_comes_before_clipping():
 
 def test_a_force_with_too_many_steps_to_count_stays_itself():
     assert driven([1e300, -1e305], {"resolution": 1e-9})[0] == [1e300, -1e305]
-
-
-PRESSED = {
-    "duration": 0.3,
-    "device": {"mass": 0.01, "damping": 0.1, "velocity": -0.05},
-    "hand": {"mass": 0.01, "stiffness": 10.0, "force": {"kind": "constant", "value": -0.5}},
-    "wall": {**WALL, "position": -1e-3},
-    "clock": {"round_trip_delay": 0.0013},
-}
 
 
 @pytest.mark.parametrize("actuator", [{"saturation": 1e6}, {"saturation": 1e3}])

@@ -11,17 +11,10 @@ from hypothesis import strategies as st
 
 from haploop.protocol.scene.scene import Scene
 from helpers.runs.captured import Captured, in_blocks, run
-from helpers.scenes.least import WALL, mistakes, scene
+from helpers.scenes.least import PRESSED, mistakes, scene
 
-PRESSED: dict[str, Any] = {
-    "duration": 0.12,
-    "seed": 5,
-    "device": {"mass": 0.01, "damping": 0.1, "velocity": -0.05},
-    "hand": {"mass": 0.01, "stiffness": 10.0, "force": {"kind": "constant", "value": -0.5}},
-    "wall": {**WALL, "position": -1e-3},
-    "encoder": {"resolution": 1e-5},
-    "dissipation": [{"kind": "damping", "damping": 0.3}],
-}
+BRAKED = {key: table for key, table in PRESSED.items() if key != "clock"}
+BRAKED |= {"duration": 0.12, "encoder": {"resolution": 1e-5}, "dissipation": [{"kind": "damping", "damping": 0.3}]}
 N, TICKS = 10, 120
 FRICTION = {"friction": {"kinetic": 0.02}}
 
@@ -31,7 +24,7 @@ def changing(delays: list[tuple[int, int]], integrator: str = "exact", **tables:
     (_, first), *later = delays
     events = [{"at": tick / 1000, "set": {"clock.round_trip_delay": steps / 10_000}} for tick, steps in later]
     return scene(
-        **{**PRESSED, **tables}, clock={"round_trip_delay": first / 10_000, "integrator": integrator}, event=events
+        **{**BRAKED, **tables}, clock={"round_trip_delay": first / 10_000, "integrator": integrator}, event=events
     )
 
 
@@ -104,5 +97,5 @@ def test_blocks_of_any_size_give_the_same_summary():
 
 def test_a_delay_of_no_whole_number_of_steps_is_refused_with_the_nearest_two():
     events = [{"at": 0.05, "set": {"clock.round_trip_delay": "0.25 ms"}}]
-    (complaint,) = mistakes(**PRESSED, event=events)
+    (complaint,) = mistakes(**BRAKED, event=events)
     assert "0.0002 s and 0.0003 s" in complaint

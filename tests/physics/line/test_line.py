@@ -19,7 +19,7 @@ from haploop.plant.line.lossy import LossyLine, make_jitter, make_loss
 from haploop.protocol.scene import effects
 from haploop.protocol.ticks import Timebase
 from helpers.runs.captured import in_blocks, run
-from helpers.scenes.least import WALL, scene, typed
+from helpers.scenes.least import PRESSED, scene, typed
 
 MANY = 100_000
 # Five standard errors: a right program meets another 999 999 of a million seeds as well.
@@ -209,14 +209,7 @@ def test_each_command_is_lost_by_itself_with_its_probability(probability):
         assert stats.binomtest(int(after_a_loss.sum()), len(after_a_loss), probability).pvalue > 1e-6
 
 
-PRESSED = {
-    "duration": 0.4,
-    "seed": 5,
-    "device": {"mass": 0.01, "damping": 0.1, "velocity": -0.05},
-    "hand": {"mass": 0.01, "stiffness": 10.0, "force": {"kind": "constant", "value": -0.5}},
-    "wall": {**WALL, "position": -1e-3},
-    "clock": {"round_trip_delay": 0.0013},
-}
+LONG = PRESSED | {"duration": 0.4}
 LATE = {"jitter": {"kind": "gamma", "mean": 0.002, "deviation": 0.002}, "loss": {"probability": 0.3}}
 
 
@@ -227,7 +220,7 @@ def expected_fate(delays: int, seed: int, jitter: effects.Jitter, probability: f
 
 
 def test_a_run_applies_the_commands_by_the_rule_and_counts_what_was_dropped_and_lost():
-    ran = run(scene(**PRESSED, **LATE))
+    ran = run(scene(**LONG, **LATE))
     fate = expected_fate(13, 5, effects.GammaJitter(mean=0.002, deviation=0.002), 0.3, 400)
     command = ran.plant["command"][:-1]
     assert np.array_equal(command, fate.command)
@@ -239,15 +232,15 @@ def test_a_run_applies_the_commands_by_the_rule_and_counts_what_was_dropped_and_
 
 
 def test_noise_changes_neither_delays_nor_losses():
-    noisy = run(scene(**PRESSED, **LATE, noise={"deviation": 1e-5, "cutoff": 100.0}))
-    assert np.array_equal(noisy.plant["command"], run(scene(**PRESSED, **LATE)).plant["command"])
+    noisy = run(scene(**LONG, **LATE, noise={"deviation": 1e-5, "cutoff": 100.0}))
+    assert np.array_equal(noisy.plant["command"], run(scene(**LONG, **LATE)).plant["command"])
 
 
 def test_blocks_of_any_size_give_the_same_summary_also_when_the_run_is_stopped_or_diverges():
     stopped = {"event": [{"at": 0.2003, "stop": True}]}
     diverging = {"device": {"mass": 0.01, "damping": 0.0, "velocity": -1.0}, "diverged_beyond": 0.02}
     for change, ended in (({}, "done"), (stopped, "stopped"), (diverging, "diverged")):
-        late = scene(**PRESSED | LATE | change)
+        late = scene(**LONG | LATE | change)
         usual = in_blocks(late, 100)
         assert usual["ended"] == ended
         assert usual["lost"]["commands_lost"] > 0

@@ -16,7 +16,7 @@ from haploop.plant.sensing.accelerometer import Accelerometer
 from haploop.protocol.scene import effects
 from haploop.protocol.ticks import Timebase
 from helpers.runs.captured import in_blocks, of_the_scene, run
-from helpers.scenes.least import WALL, scene
+from helpers.scenes.least import PRESSED, scene
 
 TIME = Timebase(plant_rate=10_000, control_rate=1000, delay_steps=0, ticks=10**6)
 MANY = 200_000
@@ -108,19 +108,11 @@ def test_overflow_is_clipped_where_there_is_a_range_and_passed_on_where_there_is
     assert readings([math.inf, 1e300], resolution=1e-9)[0].tolist() == [math.inf, 1e300]
 
 
-PRESSED = {
-    "duration": 0.3,
-    "seed": 5,
-    "device": {"mass": 0.01, "damping": 0.1, "velocity": -0.05},
-    "hand": {"mass": 0.01, "stiffness": 10.0, "force": {"kind": "constant", "value": -0.5}},
-    "wall": {**WALL, "position": -1e-3},
-    "clock": {"round_trip_delay": 0.0013},
-    "acceleration": {"source": "accelerometer"},
-}
+FELT = PRESSED | {"acceleration": {"source": "accelerometer"}}
 
 
 def test_an_accelerometer_without_faults_is_the_ideal_one():
-    ideal, table = (run(scene(**PRESSED, **more)) for more in ({}, {"accelerometer": {"range": 1e9}}))
+    ideal, table = (run(scene(**FELT, **more)) for more in ({}, {"accelerometer": {"range": 1e9}}))
     assert table.summary["accelerometer"] == {"clipped_ticks": 0}
     assert np.array_equal(ideal.controller["a"], table.controller["a"])
     assert ideal.summary["trajectory_sha256"] == table.summary["trajectory_sha256"]
@@ -128,7 +120,7 @@ def test_an_accelerometer_without_faults_is_the_ideal_one():
 
 def test_a_run_reads_what_the_sensor_makes_of_the_true_acceleration():
     faults = {"range": 60.0, "resolution": 0.01, "noise_density": 0.05, "bias": 1.5}
-    ideal, faulty = run(scene(**PRESSED)), run(scene(**PRESSED, accelerometer=faults))
+    ideal, faulty = run(scene(**FELT)), run(scene(**FELT, accelerometer=faults))
     assert ideal.summary["trajectory_sha256"] == faulty.summary["trajectory_sha256"]  # nothing here acts on a
     read, clipped = readings(ideal.controller["a"], seed=5, **faults)
     assert np.array_equal(faulty.controller["a"], read)
@@ -137,7 +129,7 @@ def test_a_run_reads_what_the_sensor_makes_of_the_true_acceleration():
 
 
 def test_an_accelerometer_no_estimate_reads_is_not_there():
-    plain = {name: table for name, table in PRESSED.items() if name != "acceleration"}
+    plain = {name: table for name, table in FELT.items() if name != "acceleration"}
     without, unread = (
         of_the_scene(run(scene(**plain, **more)).summary) for more in ({}, {"accelerometer": {"range": 1.0}})
     )
@@ -148,7 +140,7 @@ def test_clipped_ticks_are_the_same_for_blocks_of_any_size_also_when_the_run_is_
     stopped = {"event": [{"at": 0.1003, "stop": True}]}
     diverging = {"hand": {"force": {"kind": "ramp", "value": -3.0, "rise_time": 0.2}}, "diverged_beyond": 0.01}
     for change, ended in (({}, "done"), (stopped, "stopped"), (diverging, "diverged")):
-        limited = scene(**PRESSED | change, accelerometer={"range": 10.0})
+        limited = scene(**FELT | change, accelerometer={"range": 10.0})
         usual = in_blocks(limited, 100)
         assert usual["ended"] == ended
         assert usual["accelerometer"]["clipped_ticks"] > 0

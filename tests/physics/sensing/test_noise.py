@@ -14,7 +14,7 @@ from haploop.launch.runs.start import run as run_prepared
 from haploop.plant.sensing.noise import NoisyPositionSensor
 from haploop.protocol.scene import effects
 from helpers.runs.captured import in_blocks, of_the_scene, run
-from helpers.scenes.least import WALL, scene
+from helpers.scenes.least import PRESSED, scene
 
 PERIOD_S = 1e-3
 MANY = 200_000
@@ -72,14 +72,6 @@ def test_it_is_stationary_from_tick_0_on():
     assert np.mean((n[:, 3] - n[:, 2]) ** 2) < 0.02
 
 
-PRESSED = {
-    "duration": 0.3,
-    "seed": 5,
-    "device": {"mass": 0.01, "damping": 0.1, "velocity": -0.05},
-    "hand": {"mass": 0.01, "stiffness": 10.0, "force": {"kind": "constant", "value": -0.5}},
-    "wall": {**WALL, "position": -1e-3},
-    "clock": {"round_trip_delay": 0.0013},
-}
 NOISE = {"deviation": 2e-5, "cutoff": 200.0}
 
 

@@ -95,7 +95,7 @@ def advise(
     from haploop.tools.advise.command import WALLS
     from haploop.tools.advise.walls.trial import Store, Trial
 
-    subject = _subject(device, hand, delay, estimator, values, plugins)
+    subject = _subject(device, values, plugins, hand=hand, delay=delay, estimator=estimator)
     with _kept(out, WALLS) as walls, Trial(Store(walls), workers, lambda runs: None) as trial:
         return advice(subject, trial, lambda stage: None)
 
@@ -113,20 +113,13 @@ def compare(
         return find(_subject(device, **asked), grid, workers, rows)
 
 
-def _subject(
-    device: str | Path,
-    hand: str | None = None,
-    delay: str | float | None = None,
-    estimator: str | None = None,
-    values: Values = (),
-    plugins: Plugins = (),
-) -> Subject:
+def _subject(device: str | Path, values: Values = (), plugins: Plugins = (), **names: Any) -> Subject:
     """Makes the scene that is asked about, and tries its elements out."""
     from haploop.launch.scene.events import elements_of, try_out
     from haploop.tools.advise.subject import make_subject
 
     kinds = registry([Path(plugin) for plugin in plugins])
-    subject = make_subject(str(device), hand, delay, estimator, texts(values), kinds)
+    subject = make_subject(str(device), overrides=texts(values), kinds=kinds, **names)
     try_out(elements_of(subject.scene), kinds)
     return subject
 

@@ -151,7 +151,7 @@ def _scene_model(
 ) -> type[Model]:
     nothing = _model(NO_ELEMENT, "Removes the element.", {"kind": (Literal["none"], ...)})
     elements = [_element_model(kind, element) for kind, element in kinds]
-    others: Keys = {"dissipation": (list[_one_of(elements or [nothing])] | None, None), "event": (None, None)}
+    others: Keys = {"dissipation": (list[_one_of(elements or [nothing])] | None, None), "event": (type(None), None)}
     if has_spring:
         keys = {key: kept for key, kept in _keys_of(Wall, {}).items() if key in _SPRING_KEYS}
         others["wall"] = _model("Wall", Wall.__doc__, keys) | None, None

@@ -31,10 +31,10 @@ _ANEW_S = 2.0
 _WAITING_BYTES = 256 * 1024
 
 
-def make_app(viewer: Viewer, guard: Guard, heard: Heard, on_closed: Callable[[], None]) -> web.Application:
+def make_app(viewer: Viewer, guard: Guard, heard: Heard, on_closed: Callable[[], None] | None) -> web.Application:
     """Makes the web application, which notes in ``heard`` the connections from which a request has come.
 
-    Once every page that was open has been closed it calls ``on_closed``.
+    Once every page that was open has been closed it calls ``on_closed``, if there is one.
 
     GET / is the page, /static/NAME its files, /stream a WebSocket (see :mod:`haploop.view.serve.page`), /enter/KEY
     the way in for a browser that is started with a link.
@@ -69,7 +69,7 @@ def make_app(viewer: Viewer, guard: Guard, heard: Heard, on_closed: Callable[[],
         pages.add(page)
         await Page(page, viewer, guard).run()
         pages.discard(page)
-        if not pages:
+        if on_closed and not pages:
             await asyncio.sleep(_ANEW_S)
             if not pages:
                 on_closed()
@@ -140,7 +140,7 @@ async def serve(
         with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):  # not in the main thread
             loop.add_signal_handler(number, end.set)
     heard = Heard()
-    app = make_app(viewer, guard, heard, end.set if until_closed else lambda: None)
+    app = make_app(viewer, guard, heard, end.set if until_closed else None)
     quiet = {"access_log": None, "logger": quiet_logger()}
     runner = web.AppRunner(app, **quiet, keepalive_timeout=SILENT_S, shutdown_timeout=_GOODBYE_S)
     await runner.setup()

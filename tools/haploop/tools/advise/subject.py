@@ -79,13 +79,13 @@ class Subject:
 
 def make_subject(
     device: str,
-    hand: str | None,
-    delay: str | float | None,
-    estimator: str | None,
-    overrides: Sequence[str],
-    kinds: Mapping[str, type[Element]],
+    hand: str | None = None,
+    delay: str | float | None = None,
+    estimator: str | None = None,
+    overrides: Sequence[str] = (),
+    kinds: Mapping[str, type[Element]] | None = None,
 ) -> Subject:
-    """Makes the scene that the arguments of the command name.
+    """Makes the scene that the arguments of the command name; elements are those installed where ``kinds`` is None.
 
     Raises InvalidRequest for a name that is none, SceneError where the scene cannot be run.
     """
