@@ -1,9 +1,11 @@
 """The direct connection of plant and controller: what is no answer is named, and a stranger changes nothing."""
 
+import math
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgpack
 import pytest
 import zmq
 
@@ -33,6 +35,10 @@ NO_ANSWERS = [
     pack(1, HELLO, SECRET),
     pack(1, LAST, 5),
     b"\x94\x01\x16\x05" + b"\x91" * 1000 + b"\x01",
+    # As long as a frame of one force, and as it begins.
+    b"\x94\x01\x16\xce" + bytes([0, 0, 0, 4]) + b"\x91\xcb" + bytes(8),
+    b"\x94\x01\x16\xce" + bytes([0, 0, 0, 5]) + b"\x91\xa8" + b"a text!.",
+    b"\x94\x02\x16\xce" + bytes([0, 0, 0, 5]) + b"\x91\xcb" + bytes(8),
 ]
 
 
@@ -77,6 +83,29 @@ def test_whatever_the_partner_sends_in_place_of_forces_is_a_named_error(plant: P
                 plant.end.exchange(5, [(0.0,)])
     plant.partner.send(pack(1, COMMANDS, 5, [1.5]))
     assert plant.end.exchange(5, [(0.0,)]) == [1.5]
+
+
+@pytest.mark.parametrize("tick", [0, 5, 300, 2**32 - 1, 2**32])
+@pytest.mark.parametrize("values", [(-0.0,), (0.1, 0.2)])
+def test_a_frame_of_one_number_is_the_message_that_msgpack_makes_of_it(
+    plant: Plant, tick: int, values: tuple[float, ...]
+) -> None:
+    peer = plant.context.socket(zmq.DEALER)
+    peer.bind("inproc://loop")
+    controller = ControllerEnd(plant.context, {"loop": "inproc://loop"}, lambda: None)
+    for force in (-0.0, 1):
+        controller.answer(tick, [force])
+        answer = peer.recv()
+        assert msgpack.unpackb(answer) == [1, COMMANDS, tick, [force]]
+        plant.partner.send(answer)
+        answered = plant.end.exchange(tick, [values])
+        assert (answered, math.copysign(1.0, answered[0])) == ([force], math.copysign(1.0, force))
+        sample = plant.partner.recv()
+        assert msgpack.unpackb(sample) == [1, SAMPLES, tick, [list(values)]]
+        peer.send(sample)
+        assert controller.samples(tick) == [list(values)]
+    controller.socket.close()
+    peer.close()
 
 
 def test_what_a_stranger_sends_is_counted_and_dropped_and_the_answer_is_the_partners(plant: Plant) -> None:

@@ -98,7 +98,7 @@ class Controller:
         Raises:
             ElementError: an element raised, or gave something that is no number.
         """
-        state, forces = self.state, []
+        state, forces, recorder = self.state, [], self.recorder
         if state is None:
             state = self.state = initial_state(self.params, samples[0])
         for sample in samples:
@@ -111,9 +111,9 @@ class Controller:
             self.state = state
             self.tick += 1
             forces.append(row[-2])
-            for index, names in self.recorder.own:
+            for index, names in recorder.own:
                 row += self._shown(index, state[3][index], names)
-            self.recorder.add(row)
+            recorder.add(row)
         return forces
 
     def _shown(self, index: int, memory: Any, names: Sequence[str]) -> list[float]:

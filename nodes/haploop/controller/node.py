@@ -54,10 +54,12 @@ class ControllerNode:
         """Returns where installed kinds are; those that nobody names are not loaded."""
         return {name: place for name, place in self._installed.items() if name in names}
 
-    def _schedule(self, tick: int, event: Event) -> None:
-        if kind := (event.get("swap") or {}).get("kind"):
-            self._controller.learn(registry(places=self._places({kind})))
-        self._controller.schedule(tick, event)
+    def _schedule(self, events: list[tuple[int, Event]]) -> None:
+        for tick, event in events:
+            if is_change(event):
+                if kind := (event.get("swap") or {}).get("kind"):
+                    self._controller.learn(registry(places=self._places({kind})))
+                self._controller.schedule(tick, event)
 
     def _state(self) -> tuple[int, Message]:
         return self._controller.tick, {"history": self._controller.recorder.history}
@@ -71,26 +73,26 @@ class ControllerNode:
     def run(self) -> tuple[int, Message]:
         """Answers until the plant ends the run; returns the number of ticks answered."""
         controller, client, loop = self._controller, self._client, self._loop
-        while (samples := loop.samples(controller.tick)) is not None:
-            if self._checked_values:
-                check_samples(controller.tick, samples, self._checked_values)
-            end = controller.tick + len(samples)
+        checked_values, tick = self._checked_values, controller.tick
+        while (samples := loop.samples(tick)) is not None:
+            if checked_values:
+                check_samples(tick, samples, checked_values)
+            end = tick + len(samples)
             while client.until < end:
-                client.wait(controller.tick)
-            for tick, event in client.take_events() if client.events else ():
-                if is_change(event):
-                    self._schedule(tick, event)
+                client.wait(tick)
+            if client.events:
+                self._schedule(client.take_events())
             try:
-                loop.answer(controller.tick, controller.answer(samples))
+                loop.answer(tick, controller.answer(samples))
             except ElementError:
                 self._flush()
                 raise
-            held = end - self._reported
+            tick, held = end, end - self._reported
             if held >= self._block.ticks or (end >= client.until and self._block.is_worth_it(held)):
                 self._flush()
                 client.poll()
         self._flush()
-        tick, trouble = controller.tick, controller.recorder.trouble
+        trouble = controller.recorder.trouble
         self._publisher.publish("END", tick, "", trouble)
         return tick, {"strangers": self._publisher.unknown_peers, "trouble": trouble}
 

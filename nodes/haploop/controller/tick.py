@@ -140,7 +140,10 @@ def tick(params: ControllerParams, state: StateTuple, sample: Sample) -> tuple[S
                     force, memory = active.element.force(motion, memory)
                 memories = (*memories[:index], memory, *memories[index + 1 :])
             if one_loop:
-                force = _number(force) if contact or active.acts == "always" else 0.0
+                if not contact and active.acts != "always":
+                    force = 0.0
+                elif force.__class__ is not float:
+                    force = _number(force)
             else:
                 force = 1.0 * (force if active.acts == "always" else where(contact, force, 0.0))
             row.append(force)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from reprlib import repr as shortened
+from struct import Struct
 
 import msgpack
 import zmq
@@ -20,6 +21,15 @@ _LAST = MESSAGES["LAST"].code
 
 # True equals 1, and so does 1.0; the types of what came are looked at, too.
 _NUMBERS = frozenset({int, float})
+
+# Without delay a message holds one number. Its bytes are msgpack's: four entries, version and code; the tick as uint32;
+# a list of one sample of one float64, or of one force. They are made and known at once, which is three times as quick.
+_SAMPLE, _COMMAND = Struct(">4sI3sd"), Struct(">4sI2sd")
+_SAMPLE_BEGINS, _COMMAND_BEGINS = (bytes((0x94, VERSION, code, 0xCE)) for code in (_SAMPLES, _COMMANDS))
+_SAMPLE_LIST, _COMMAND_LIST = b"\x91\x91\xcb", b"\x91\xcb"
+_LATEST = 2**32 - 1
+# A plain int, which is quicker to pass than what zmq has.
+_MORE = int(zmq.SNDMORE)
 
 # So often a controller that gets no samples sees to what else it has to do.
 IDLE_MS = 20
@@ -62,15 +72,23 @@ class PlantEnd:
         Raises LoopError where the answer is for other ticks.
         """
         emit, partner = self._emit, self._partner
+        if len(samples) == 1 and len(samples[0]) == 1 and tick <= _LATEST:
+            frame = _SAMPLE.pack(_SAMPLE_BEGINS, tick, _SAMPLE_LIST, samples[0][0])
+        else:
+            frame = self._pack((VERSION, _SAMPLES, tick, samples))
         try:
-            emit(partner, zmq.SNDMORE)
-            emit(self._pack((VERSION, _SAMPLES, tick, samples)))
+            emit(partner, _MORE)
+            emit(frame)
         except zmq.ZMQError as error:
             _raise_unless_gone(error)
         sender, data = self._receive()
         while sender != partner:
             self.unknown_peers += 1
             sender, data = self._receive()
+        if len(data) == _COMMAND.size and len(samples) == 1:
+            begins, of, form, force = _COMMAND.unpack(data)
+            if of == tick and begins == _COMMAND_BEGINS and form == _COMMAND_LIST:
+                return [force]
         try:
             *head, forces = msgpack.unpackb(data)
             are_whole = head == [VERSION, _COMMANDS, tick] and type(head[0]) is type(head[1]) is type(head[2]) is int
@@ -87,7 +105,7 @@ class PlantEnd:
 
     def _send(self, data: bytes) -> None:
         try:
-            self._emit(self._partner, zmq.SNDMORE)
+            self._emit(self._partner, _MORE)
             self._emit(data)
         except zmq.ZMQError as error:
             _raise_unless_gone(error)
@@ -133,6 +151,10 @@ class ControllerEnd:
         Raises LoopError where samples of other ticks came, or none will come although some are missing.
         """
         data = self._receive()
+        if len(data) == _SAMPLE.size:
+            begins, of, form, x = _SAMPLE.unpack(data)
+            if of == tick and begins == _SAMPLE_BEGINS and form == _SAMPLE_LIST:
+                return [[x]]
         try:
             *head, samples = msgpack.unpackb(data)
             are_whole = type(head[0]) is type(head[1]) is type(head[-1]) is int
@@ -146,7 +168,10 @@ class ControllerEnd:
 
     def answer(self, tick: int, forces: list[float]) -> None:
         """Sends the forces of the ticks from ``tick`` on, N."""
-        self._emit(self._pack((VERSION, _COMMANDS, tick, forces)))
+        if len(forces) == 1 and forces[0].__class__ is float and tick <= _LATEST:
+            self._emit(_COMMAND.pack(_COMMAND_BEGINS, tick, _COMMAND_LIST, forces[0]))
+        else:
+            self._emit(self._pack((VERSION, _COMMANDS, tick, forces)))
 
     def _receive(self) -> bytes:
         while True:
