@@ -1,29 +1,33 @@
 """The comparison of stabilizers: one search for all, what is measured of a wall, what is told apart, what is said."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from haploop.protocol.scene.paths import with_value
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Encoder, Scene
 from haploop.tools.advise import families
-from haploop.tools.advise.families import STABILIZERS, Family, applies, halton
+from haploop.tools.advise.families import STABILIZERS, Family, Values, applies, halton
 from haploop.tools.advise.subject import make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop, ranges
 from haploop.tools.advise.walls.limit import Query
 from haploop.tools.advise.walls.rendered import Rendered, Trying, rendered, tried
 from haploop.tools.advise.walls.trial import Store, Trial
-from haploop.tools.compare.bench import Effort, Row, along
+from haploop.tools.compare import bench as of_bench
+from haploop.tools.compare.bench import BESIDE, Effort, Job, Row, along, bench
 from haploop.tools.compare.comparison import AGAIN, TOLD, Comparison, Kept, OfLoop, as_comparison
 from haploop.tools.compare.conditions import draw
-from haploop.tools.compare.page import page, sentences
-from haploop.tools.compare.ranking import best, held, ranking
+from haploop.tools.compare.page import page, places, sentences
+from haploop.tools.compare.ranking import best, choice, held, ranking
 from haploop.tools.compare.report import comparison_data, report
 from haploop.tools.search.intervals import mean_interval
 from helpers.scenes.least import KINDS
 from helpers.shown import shown
 
+PAGE_TEXT = (Path(__file__).parents[2] / "docs/comparison.md").read_text(encoding="utf-8")
 WAVES = (-1.0, 1.0, -0.5, 0.5)
 
 
@@ -35,7 +39,7 @@ def loop_of(device: str, *overrides: str) -> Scene:
 def row(family: Family, held_N_m: float, block: int = TOLD, spread_N_m: float = 10.0) -> Row:
     """A row whose seeds hold about so much."""
     seeds = [Trying(held_N_m, held_N_m, Rendered(held_N_m + spread_N_m * wave), np.inf, None) for wave in WAVES]
-    return Row(family.name, block, (1.0,) * len(family.parts), (), tuple(seeds), None)
+    return Row(family.name, block, (1.0,) * len(family.parts), (), tuple(seeds))
 
 
 def compared(**held_N_m: float) -> Comparison:
@@ -45,7 +49,8 @@ def compared(**held_N_m: float) -> Comparison:
         tuple(row(family, value, block) for family, value in zip(STABILIZERS, told, strict=True))
         for block in (TOLD, AGAIN)
     )
-    return Comparison("a device", "a task", (), Effort(), (OfLoop("as described", 0.0, 1000.0, rows, again),))
+    loop = OfLoop("as described", 0.0, 1000.0, rows, again)
+    return Comparison("a device", "a task", (), Effort(), BESIDE, (loop,))
 
 
 def test_every_installed_element_is_compared():
@@ -76,6 +81,41 @@ def test_parameters_lie_in_their_box_as_many_for_one_as_for_three(count):
     assert all(1e-3 <= value <= 10.0 for values in (*points, *beside) for value in values)
 
 
+@pytest.mark.parametrize("family", [families.NOTHING, families.DAMPING, families.ADAPTIVE_BOTH, STABILIZERS[-1]])
+def test_every_stabilizer_has_the_same_effort_and_the_search_goes_where_most_is_held(
+    family: Family, monkeypatch: pytest.MonkeyPatch
+):
+    """In place of loops: a hill of what is held over the parameters, highest in the middle of their box."""
+    ends = families.box(family, loop := loop_of("touch", "clock.round_trip_delay=1e-3"), 1000.0)
+    asked: list[tuple[Values, int]] = []
+
+    def hill(_: Trial, queries: list[Query], tolerance: float) -> list[Trying]:
+        values = [tuple(v for table in query.elements for v in table.parameters.values()) for query in queries]
+        off = [sum((np.log(v / (low * high) ** 0.5) / np.log(high / low)) ** 2
+                   for v, (low, high) in zip(some, ends, strict=True)) for some in values]  # fmt: skip
+        asked.append((values, len(queries)))
+        return [Trying(1000.0, 1000.0, Rendered(1000.0 - 500.0 * each), np.inf, None) for each in off]
+
+    monkeypatch.setattr(of_bench, "tried", hill)
+    effort = Effort()
+    rows = bench(Job(loop, family.name, 1000.0, ((TOLD, None), (AGAIN, None)), effort))
+    *tuning, (_, trial) = asked
+    if family.parts:
+        first, second = (count / 2 for _, count in tuning)
+        assert first == effort.first * (effort.points + 1)
+        assert effort.tuning * effort.around <= second <= effort.tuning * (effort.finalists + effort.around)
+    else:
+        assert not tuning
+    moved = 2 + 2 * bool(family.parts)
+    assert trial == 2 * effort.seeds + moved * effort.moved
+    assert [row.block for row in rows] == [TOLD, AGAIN]
+    assert all(held(row).value > 970.0 for row in rows), "of 625 to 1000 in the box of three parameters"
+    assert len(rows[0].device) == 2
+    assert len(rows[0].parameter) == 2 * bool(family.parts)
+    beside = bench(Job(loop, family.name, 1000.0, tuple((row.block, row.values) for row in rows), BESIDE))
+    assert all(held(more).value >= held(less).value for more, less in zip(beside, rows, strict=True))
+
+
 @pytest.fixture(scope="module")
 def smooth() -> Scene:
     """A rigid device without friction and encoder, in the hand."""
@@ -92,6 +132,9 @@ def test_a_wall_alone_renders_its_own_stiffness_and_a_coupling_that_of_two_sprin
     assert plain[3:] == pytest.approx((0.0, 0.0), abs=1e-12)
     assert coupled.held_N_m == pytest.approx(225.0, rel=0.01)
     assert none == Rendered()
+    coarse = replace(smooth, encoder=Encoder(resolution=2e-4))
+    [read] = rendered([Query(coarse, (), case, ())], [300.0])
+    assert read.held_N_m == pytest.approx(300.0, rel=1e-9), "of what is read, wherever between counts the device is"
 
 
 def test_a_delay_is_felt_as_a_softer_contact_and_damping_as_a_harder_one(smooth: Scene):
@@ -116,6 +159,12 @@ def test_what_may_differ_by_nothing_or_is_not_reproduced_cannot_be_told_apart():
     assert ranking(other).versus("damping", "nothing") == "alike"
     assert ranking(other).contradicted == {("damping", "nothing")}
     wide = replace(same, rows=(row(few, 1000.0, spread_N_m=200.0), row(many, 1050.0)))
+    assert choice(wide).family == "nothing"
+    assert choice(same).family == "damping"
+    hidden = replace(
+        same, rows=(*rows, row(families.FORCE_BOUNDING, 90.0)), again=(*same.again, row(families.FORCE_BOUNDING, 90.0))
+    )
+    assert ranking(hidden) == ranking(same), "what holds next to nothing is no match"
     assert not ranking(wide).told
     assert best(wide)[1] == [wide.rows[0]]
     assert held(rows[0]).low < 1000.0 < held(rows[0]).high
@@ -125,18 +174,33 @@ def test_the_sentences_follow_from_the_rankings():
     told = sentences([compared()])
     assert len(told) == 5
     assert "adaptive inertia does not help" in told[4]
+    assert told[0] == "Most is held, as described, on a device at 0 ms by no element more than by none, 1.00 N/mm."
+    assert told[1].startswith("Take nothing on a device at 0 ms: ")
     assert told[2] == "Damping against nothing: it cannot be told from it on any of these loops."
-    assert told[1].endswith("on a device at 0 ms nothing.")
     helped = sentences([compared(adaptive_damping_and_inertia=2000.0)])
-    assert "against adaptive damping: it renders more on each of these loops" in helped[4]
-    assert "adaptive inertia helps there" in helped[4]
-    assert helped[1].endswith("adaptive damping and inertia.")
+    assert "against adaptive damping: it holds more on each of these loops" in helped[4]
+    assert helped[4].endswith("adaptive inertia helps there.")
+    assert helped[1].startswith("Take adaptive damping and inertia on")
+    both = sentences([compared(adaptive_damping_and_inertia=2000.0, damping=2000.0)])
+    assert both[1].startswith("Take damping on"), "the simpler of two that are alike"
+    assert "but nowhere more than" in both[4]
     worse = sentences([compared(adaptive_damping_and_inertia=2000.0, adaptive_inertia=500.0)])
     assert "adaptive inertia is no remedy" in worse[4]
-    assert "no element holds more than none" in told[0]
-    assert "no element" not in helped[0]
     harmful = sentences([compared(unidirectional_inertia=500.0)])
-    assert "renders less on each of these loops" in harmful[3]
+    assert "holds less on each of these loops" in harmful[3]
+
+
+def test_loops_are_named_by_their_device_once_for_all_of_them():
+    of = compared().loops[0]
+    loops = {("a", "as described"): of, ("a", "slow"): of, ("b", "as described"): of, ("b", "slow"): of}
+    assert places([*loops], loops) == "every loop of a and every loop of b"
+    assert places([("a", "slow"), ("b", "as described"), ("b", "slow")], loops) == "a (slow) and every loop of b"
+
+
+def test_no_ranking_of_the_page_is_the_other_way_round_under_other_seeds():
+    said = re.findall(r"(\d+) of (\d+) pairs that are apart are so .* (\d+) are the other way round", PAGE_TEXT)
+    assert said
+    assert all(other == "0" for *_, other in said)
 
 
 def test_page_and_report_are_made_of_what_was_written():

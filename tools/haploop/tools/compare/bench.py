@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.changes import scaled
 from haploop.tools.advise.families import STABILIZERS, Family, Values, box, halton
-from haploop.tools.advise.report import describe
 from haploop.tools.advise.walls.cases import ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, MOST_N_M, Query, ladder, limits
 from haploop.tools.advise.walls.rendered import Trying, tried
@@ -17,36 +18,47 @@ from haploop.tools.advise.walls.trial import Store, Trial
 from haploop.tools.compare.conditions import draw
 
 # How closely limits are found while parameters are compared, and then.
-_ROUGH, CLOSE = 0.25, 0.08
-# Rungs of the tuning, as multiples of the wall without any element: softer walls have to bear everything, too.
-_RUNGS = (0.3, 0.8, 1.0, 1.25, 1.55, 1.95, 2.5, 4.0, 7.0)
-# Rungs of a trial, as multiples of the limit in the tuning.
-_ABOUT = (0.15, 0.5, 0.7, 0.8, 0.9, 1.0, 1.12, 1.25, 1.5)
+_ROUGH, _CLOSE = 0.25, 0.08
+# Rungs as multiples of the wall without any element, the same for all, so that those who bear the same get the same.
+_RUNGS = ladder(1.7**-2, 1.7**2, 1.7)
 # The share of a box's logarithmic axes that is searched through the best.
 _ALONG = 0.6
+# Tuning has seeds of its own, from this one on.
+_TUNING = 1000
 # What is 20 % off, together, to tell how sensitive the wall is to the device.
 _DEVICE = ("device.mass", "device.damping", "friction.kinetic", "transmission.stiffness")
 OFF = (0.8, 1.2)
 
 Ends = tuple[float, float]
+# Of some block, these parameters.
 Choice = tuple[int, Values]
-Tune = Callable[[Sequence[Choice]], dict[Choice, Trying]]
+# What choices hold, N/m, mean of so many seeds.
+Held = Callable[[Sequence[Choice], int], dict[Choice, float]]
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is spent on every stabilizer alike.
+    """How much is spent on every stabilizer alike; each seed draws ``of_seed`` conditions.
 
     Attributes:
-        points: parameters tried in the whole box, and as many along its axes through the best.
-        cases: of the tuning.
-        seeds: each draws ``of_seed`` cases.
+        points: parameters tried over the whole box by ``first`` seeds, the smallest of all beside them.
+        finalists: so many of them go on, with ``around`` more along the axes through the best, by ``tuning`` seeds.
+        seeds: try the best one.
+        moved: of these also try it with all parameters, and the device, 20 % off.
     """
 
-    points: int = 7
-    cases: int = 4
-    seeds: int = 6
+    points: int = 12
+    first: int = 2
+    finalists: int = 3
+    around: int = 6
+    tuning: int = 6
+    seeds: int = 16
+    moved: int = 6
     of_seed: int = 3
+
+
+# Where the parameters of a like loop are known, the search begins and ends about them.
+BESIDE = Effort(points=0, finalists=1, tuning=4, seeds=8, moved=0)
 
 
 @dataclass(frozen=True)
@@ -55,16 +67,15 @@ class Job:
 
     Attributes:
         alone_N_m: about the stiffest wall without any.
-        blocks: the seeds that it is tuned and tried by, each for itself; blocks share none.
-        sensitive: whether its sensitivity is measured, by the first block.
+        starts: blocks of seeds that it is tuned and tried by, each for itself, since blocks share none; and the
+            parameters from which each begins, None for the whole box.
     """
 
     loop: Scene
     family: str
     alone_N_m: float
-    blocks: tuple[int, ...]
+    starts: tuple[tuple[int, Values | None], ...]
     effort: Effort
-    sensitive: bool = True
 
 
 @dataclass(frozen=True)
@@ -75,7 +86,6 @@ class Row:
         values: the parameters that render most in the tuning, in the order of the family.
         at_edge: the parameters within a twentieth of the end of their search, and "wall" where no stiffest was found.
         seeds: what came of each seed with those parameters.
-        breaks: the softest wall that failed under any of them, N/m, and what it did.
         parameter, device: the held stiffness with all parameters, or the device, 20 % less and more, over that without.
     """
 
@@ -84,7 +94,6 @@ class Row:
     values: Values
     at_edge: tuple[str, ...]
     seeds: tuple[Trying, ...]
-    breaks: tuple[float, str] | None
     parameter: tuple[float, ...] = ()
     device: tuple[float, ...] = ()
 
@@ -102,71 +111,68 @@ def alone(loop: Scene) -> float:
 
 def bench(job: Job) -> tuple[Row, ...]:
     """Tunes and tries one stabilizer by every block of seeds, side by side."""
-    loop, family, effort, blocks = job.loop, family_of(job.family), job.effort, job.blocks
+    loop, family, effort = job.loop, family_of(job.family), job.effort
     of, ends = ranges(loop), box(family, loop, job.alone_N_m)
-    tuning = {block: draw(of, block, 0, effort.cases) for block in blocks}
+    rungs = tuple(job.alone_N_m * times for times in _RUNGS)
+
+    def queries(choice: Choice, first: int, count: int, device: float = 1.0) -> list[Query]:
+        (block, values), moved = choice, loop if device == 1.0 else _device(loop, device)
+        drawn = (draw(of, block, seed, effort.of_seed) for seed in range(first, first + count))
+        return [Query(moved, family.elements(values), cases, rungs) for cases in drawn]
+
     with Trial(Store(), 1) as trial:
 
-        def tune(choices: Sequence[Choice]) -> dict[Choice, Trying]:
-            rungs = tuple(job.alone_N_m * times for times in _RUNGS)
-            queries = [Query(loop, family.elements(values), tuning[block], rungs) for block, values in choices]
-            return dict(zip(choices, tried(trial, queries, _ROUGH), strict=True))
+        def held(choices: Sequence[Choice], seeds: int) -> dict[Choice, float]:
+            asked = [query for choice in choices for query in queries(choice, _TUNING, seeds)]
+            found = [each.rendered.held_N_m for each in tried(trial, asked, _ROUGH)]
+            return dict(zip(choices, np.reshape(found, (-1, seeds)).mean(axis=1).tolist(), strict=True))
 
-        best = _tuned(tune, ends, effort.points, blocks)
-        queries: list[Query] = []
-        for block, (values, near) in best.items():
-            elements = family.elements(values)
-            rungs = tuple(times * (near.limit_N_m or job.alone_N_m / 3.0) for times in _ABOUT)
-            drawn = [draw(of, block, seed, effort.of_seed) for seed in range(1, effort.seeds + 1)]
-            queries += [Query(loop, elements, cases, rungs) for cases in drawn]
-            if job.sensitive and block == blocks[0]:
-                off = [family.elements(_times(values, ends, factor)) for factor in OFF] if values else []
-                queries += [Query(loop, some, tuning[block], rungs) for some in (elements, *off)]
-                queries += [Query(_device(loop, factor), elements, tuning[block], rungs) for factor in OFF]
-        found = tried(trial, queries, CLOSE)
-    later = (len(blocks) - 1) * effort.seeds
-    parts = [
-        found[: len(found) - later],
-        *(found[at : at + effort.seeds] for at in range(len(found) - later, len(found), effort.seeds)),
+        best = _tuned(held, ends, job)
+        asked = [query for choice in best.items() for query in queries(choice, 1, effort.seeds)]
+        (block, values), *_ = best.items()
+        off = [(_times(values, ends, factor), 1.0) for factor in OFF] if values else []
+        off += [(values, factor) for factor in OFF]
+        asked += [query for some, device in off for query in queries((block, some), 1, effort.moved, device)]
+        found = tried(trial, asked, _CLOSE)
+    tries = [tuple(found[at * effort.seeds :][: effort.seeds]) for at in range(len(best))]
+    shares = _shares(tries[0], found[len(best) * effort.seeds :], effort.moved)
+    rows = [
+        Row(family.name, block, values, _at_edge(family, values, ends, seeds), seeds)
+        for (block, values), seeds in zip(best.items(), tries, strict=True)
     ]
-    return tuple(
-        _row(family, block, best[block][0], ends, part, effort.seeds) for block, part in zip(blocks, parts, strict=True)
-    )
+    return replace(rows[0], parameter=shares[: -len(OFF)], device=shares[-len(OFF) :]), *rows[1:]
 
 
-def _row(family: Family, block: int, values: Values, ends: Sequence[Ends], found: Sequence[Trying], count: int) -> Row:
-    """Makes the row of a block: so many seeds, then the tuning again as it is and with what is 20 % off."""
-    seeds, base, *moved = (found[:count], *(each.rendered.held_N_m for each in found[count:]), 0.0)
-    shares = [each / base if base else 0.0 for each in moved[:-1]]
-    worst = min((each for each in seeds if each.failure), key=lambda each: each.fails_N_m, default=None)
-    return Row(
-        family=family.name,
-        block=block,
-        values=values,
-        at_edge=_at_edge(family, values, ends, seeds),
-        seeds=tuple(seeds),
-        breaks=(worst.fails_N_m, describe(worst.failure)) if worst and worst.failure else None,
-        parameter=tuple(shares[: -len(OFF)]),
-        device=tuple(shares[-len(OFF) :]),
-    )
+def _shares(as_is: Sequence[Trying], moved: Sequence[Trying], count: int) -> tuple[float, ...]:
+    """Returns what is held when something is moved over what is held without, for each so many seeds."""
+    base = sum(each.rendered.held_N_m for each in as_is[:count])
+    sums = [sum(each.rendered.held_N_m for each in moved[at : at + count]) for at in range(0, len(moved), count or 1)]
+    return tuple(each / base if base else 0.0 for each in sums)
 
 
-def _tuned(tune: Tune, ends: Sequence[Ends], count: int, blocks: Sequence[int]) -> dict[int, tuple[Values, Trying]]:
-    """Returns what renders most in each block: of some over the whole box, then of as many along its axes.
+def _tuned(held: Held, ends: Sequence[Ends], job: Job) -> dict[int, Values]:
+    """Returns what renders most in each block: of some over the whole box; then of the best of them, and others along
+    the axes through the best, by more seeds.
 
     The first has the smallest of all parameters, which are about none.
     """
-    first = [tuple(float(f"{low:.2g}") for low, _ in ends), *(halton(ends, count) if ends else [])]
-    known = tune([(block, values) for block in blocks for values in first])
+    if not ends:
+        return {block: () for block, _ in job.starts}
+    effort, smallest = job.effort, tuple(float(f"{low:.2g}") for low, _ in ends)
+    points = [smallest, *halton(ends, effort.points)]
+    searched = [(block, values) for block, start in job.starts for values in (points if start is None else [])]
+    known = held(searched, effort.first) if searched else {}
+    going = list[Choice]()
+    for block, start in job.starts:
+        order = [start] if start is not None else _most(known, block)[: effort.finalists]
+        going += [(block, values) for values in dict.fromkeys([*order, *along(order[0], ends, _ALONG, effort.around)])]
+    known = held(going, effort.tuning)
+    return {block: _most(known, block)[0] for block, _ in job.starts}
 
-    def best(block: int) -> tuple[Values, Trying]:
-        of_block = {values: each for (of, values), each in known.items() if of == block}
-        return max(of_block.items(), key=lambda each: each[1].rendered.held_N_m)
 
-    if ends:
-        more = [(block, values) for block in blocks for values in along(best(block)[0], ends, _ALONG, count)]
-        known |= tune([choice for choice in more if choice not in known])
-    return {block: best(block) for block in blocks}
+def _most(known: dict[Choice, float], block: int) -> list[Values]:
+    """Returns the parameters of a block, those that render most first."""
+    return sorted((values for of, values in known if of == block), key=lambda values: -known[block, values])
 
 
 def along(best: Values, ends: Sequence[Ends], share: float, count: int) -> list[Values]:

@@ -63,18 +63,20 @@ def find(subject: Subject, grid: bool, workers: int | None, rows: Path) -> Compa
     """Compares the stabilizers on a subject's loop, with ``grid`` on others like it; ``rows`` keeps what was found."""
     from haploop.tools.advise.families import FORCE_BOUNDING, applies
     from haploop.tools.advise.walls.cases import make_loop
-    from haploop.tools.compare.bench import Effort
-    from haploop.tools.compare.comparison import DESCRIBED, Comparison, Kept, compare, variants
+    from haploop.tools.compare.bench import BESIDE, Effort
+    from haploop.tools.compare.comparison import Comparison, Kept, compare, variants
     from haploop.tools.compare.conditions import task_words
     from haploop.tools.executor.executors import make_executor
     from haploop.tools.render.progress import bars
 
     loop = make_loop(subject.scene, subject.has_task)
-    loops, effort = variants(loop) if grid else {DESCRIBED: loop}, Effort()
+    loops, effort = variants(loop), Effort()
+    if not grid:
+        loops = dict([*loops.items()][:1])
     with bars() as stage, make_executor(workers) as executor:
-        found = compare(loops, effort, Kept(rows), executor, stage)
+        found = compare(loops, effort, BESIDE, Kept(rows), executor, stage)
     notes = [*subject.notes, *([] if applies(FORCE_BOUNDING, loop) else [_NO_BOUND])]
-    return Comparison(subject.name, task_words(loop), tuple(notes), effort, found)
+    return Comparison(subject.name, task_words(loop), tuple(notes), effort, BESIDE, found)
 
 
 def _compare(subject: Subject, grid: bool, workers: int | None, out: Path | None, as_json: bool) -> None:

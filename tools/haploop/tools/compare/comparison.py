@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
@@ -15,7 +15,7 @@ from typing import Any
 
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Actuator, Scene
-from haploop.tools.advise.families import STABILIZERS, applies
+from haploop.tools.advise.families import STABILIZERS, Values, applies
 from haploop.tools.advise.walls.rendered import Rendered, Trying
 from haploop.tools.advise.walls.trial import Failure
 from haploop.tools.compare.bench import Effort, Job, Row, alone, bench
@@ -25,8 +25,6 @@ from haploop.tools.render.progress import Stage
 DESCRIBED = "as described"
 # Seeds that are told, and those that rankings are held against: tuning and trial have others.
 TOLD, AGAIN = 1, 2
-# Loops that are tried under both: as described, and with more delay.
-_REPEATED = 2
 _LATER_S, _FINER, _DRIVE_HZ = 1e-3, 0.25, 100.0
 
 
@@ -38,14 +36,14 @@ class OfLoop:
         delay_s: the round trip.
         alone_N_m: about the stiffest wall without any, from which the searches begin.
         rows: under the seeds told.
-        again: under the others; empty where they were not tried.
+        again: under the others.
     """
 
     name: str
     delay_s: float
     alone_N_m: float
     rows: tuple[Row, ...]
-    again: tuple[Row, ...] = ()
+    again: tuple[Row, ...]
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,8 @@ class Comparison:
     """What ``haploop compare`` found.
 
     Attributes:
-        loops: the loop as described first.
+        effort: on the loop as described, the first of the loops.
+        beside: on each other.
         task: what every wall has to bear, in words.
     """
 
@@ -61,6 +60,7 @@ class Comparison:
     task: str
     notes: tuple[str, ...]
     effort: Effort
+    beside: Effort
     loops: tuple[OfLoop, ...]
 
 
@@ -105,40 +105,52 @@ def key_of(*told: object) -> str:
 
 
 def compare(
-    loops: dict[str, Scene], effort: Effort, kept: Kept, executor: Executor, stage: Stage
+    loops: dict[str, Scene], effort: Effort, beside: Effort, kept: Kept, executor: Executor, stage: Stage
 ) -> tuple[OfLoop, ...]:
-    """Tunes and tries every stabilizer on every loop but what is kept; on two of them under two sets of seeds."""
-    repeated = list(loops)[:_REPEATED]
-    ends = _each(alone, {key_of("alone", loop): loop for loop in loops.values()}, kept, executor,
-                 stage, "walls without any element", float)  # fmt: skip
-    alone_N_m = {name: ends[key_of("alone", loop)] for name, loop in loops.items()}
-    jobs = {
-        (name, family.name): Job(
-            loop, family.name, alone_N_m[name], (TOLD, AGAIN) if name in repeated else (TOLD,), effort, name in repeated
-        )
-        for name, loop in loops.items()
-        for family in STABILIZERS
-        if applies(family, loop)
-    }
-    found = _each(bench, {key_of(job): job for job in jobs.values()}, kept, executor, stage, "stabilizers", _as_rows)
+    """Tunes and tries every stabilizer on every loop but what is kept, each by two sets of seeds.
 
-    def rows(name: str, block: int) -> tuple[Row, ...]:
-        return tuple(
-            row for (of, _), job in jobs.items() if of == name for row in found[key_of(job)] if row.block == block
-        )
-
+    Args:
+        effort: on the first loop, in the whole box of parameters.
+        beside: on each other, about what is best on the first.
+    """
+    found: dict[tuple[str, str], tuple[Row, ...]] = {}
+    alone_N_m = _each(alone, loops, kept, executor, stage, "walls without any element", float)
+    main, *others = loops
+    for names, of in (([main], effort), (others, beside)):
+        jobs = {
+            (name, family.name): Job(
+                loops[name], family.name, alone_N_m[name], _starts(found.get((main, family.name))), of
+            )
+            for name in names
+            for family in STABILIZERS
+            if applies(family, loops[name])
+        }
+        found |= _each(bench, jobs, kept, executor, stage, f"stabilizers on {' and '.join(names)}", _as_rows)
     return tuple(
-        OfLoop(name, loop.clock.round_trip_delay, alone_N_m[name], rows(name, TOLD), rows(name, AGAIN))
+        OfLoop(
+            name,
+            loop.clock.round_trip_delay,
+            alone_N_m[name],
+            *(
+                tuple(row for (of, _), rows in found.items() if of == name for row in rows if row.block == block)
+                for block in (TOLD, AGAIN)
+            ),
+        )
         for name, loop in loops.items()
     )
 
 
+def _starts(rows: tuple[Row, ...] | None) -> tuple[tuple[int, Values | None], ...]:
+    return tuple((row.block, row.values) for row in rows) if rows else ((TOLD, None), (AGAIN, None))
+
+
 def _each(
-    call: Callable[[Any], Any], items: dict[str, Any], kept: Kept, executor: Executor, stage: Stage, words: str,
+    call: Callable[[Any], Any], items: Mapping[Any, Any], kept: Kept, executor: Executor, stage: Stage, words: str,
     read: Callable[[Any], Any],
-) -> dict[str, Any]:  # fmt: skip
-    """Calls on each item that nothing is kept of; answers are kept as they come."""
-    new = {key: item for key, item in items.items() if kept.get(key) is None}
+) -> dict[Any, Any]:  # fmt: skip
+    """Calls on each item that nothing is kept of, and returns the answers by name; they are kept as they come."""
+    keys = {name: key_of(call.__name__, item) for name, item in items.items()}
+    new = {keys[name]: item for name, item in items.items() if kept.get(keys[name]) is None}
     advance = stage(words, len(new))
     under_way: dict[Future[Any], str] = {}
     while new or under_way:
@@ -149,7 +161,7 @@ def _each(
             answer = future.result()
             kept.add(under_way.pop(future), answer if isinstance(answer, float) else [asdict(row) for row in answer])
             advance()
-    return {key: read(kept.get(key)) for key in items}
+    return {name: read(kept.get(key)) for name, key in keys.items()}
 
 
 def _as_rows(data: Sequence[dict[str, Any]]) -> tuple[Row, ...]:
@@ -158,14 +170,12 @@ def _as_rows(data: Sequence[dict[str, Any]]) -> tuple[Row, ...]:
 
 def _as_row(data: dict[str, Any]) -> Row:
     """Returns the row that ``asdict`` and JSON made lists of."""
-    breaks = data["breaks"]
     return Row(
         family=data["family"],
         block=data["block"],
         values=tuple(data["values"]),
         at_edge=tuple(data["at_edge"]),
         seeds=tuple(_as_trying(each) for each in data["seeds"]),
-        breaks=(breaks[0], breaks[1]) if breaks else None,
         parameter=tuple(data["parameter"]),
         device=tuple(data["device"]),
     )
@@ -182,7 +192,8 @@ def as_comparison(data: dict[str, Any]) -> Comparison:
         )
         for each in data["loops"]
     ]
-    return Comparison(data["name"], data["task"], tuple(data["notes"]), Effort(**data["effort"]), tuple(loops))
+    efforts = (Effort(**data[name]) for name in ("effort", "beside"))
+    return Comparison(data["name"], data["task"], tuple(data["notes"]), *efforts, tuple(loops))
 
 
 def _as_trying(data: Sequence[Any]) -> Trying:

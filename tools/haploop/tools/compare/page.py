@@ -22,8 +22,17 @@ from haploop.tools.cli.options import WRONG_USE, leave
 from haploop.tools.compare.command import COMPARISON
 from haploop.tools.compare.comparison import Comparison, OfLoop, as_comparison
 from haploop.tools.compare.figure import figure_of
-from haploop.tools.compare.ranking import best, held, ranking
-from haploop.tools.compare.report import READING, again_sentence, cells, join, most_sentence, task_sentence
+from haploop.tools.compare.ranking import best, choice, held, ranking, shows_walls, without
+from haploop.tools.compare.report import (
+    READING,
+    again_sentence,
+    cells,
+    hidden_sentence,
+    join,
+    loops_rows,
+    most_sentence,
+    task_sentence,
+)
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.terminal import markdown_table
@@ -32,76 +41,105 @@ PAGE, FIGURE = "comparison.md", "comparison.png"
 _INTRO = """\
 Every stabilizer that comes with haploop, each tuned by the same search with the same effort on the same task, then
 tried under seeds that the search has not seen. Written by `make comparison`; `haploop compare DEVICE` does the same
-for a device or a scene of yours, also with more delay, a finer encoder and a slower drive. Two are *ranked* where the
-95 % interval of their difference, seed by seed under the same conditions, does not hold 0, the same way under two sets
-of seeds that share nothing, tuning included; all else cannot be told apart. Every loop is named by its device and its
-round-trip delay: a device without a cable is taken as rigid, and without a delay would bear walls that no device
-renders. *Held* may be more than the wall where counts of the encoder are coarse: it reads deeper than the device is."""
-_MOST = "Most is rendered {0}."
-_TAKE = "Take the simplest of those that cannot be told from the best: {0}."
-_WHERE = {"more": "renders more on {0}", "less": "renders less on {0}", "alike": "cannot be told from it on {0}"}
+for a device or a scene of yours. One is said to hold *more* than another where the 95 % interval of their difference,
+seed by seed under the same conditions, does not hold 0, the same way under two sets of seeds that share nothing, tuning
+included; all else cannot be told apart. A device file without a cable is taken as rigid, which without a delay would
+bear walls that no device renders: such a device has a round trip of 1 ms here."""
+_WHERE = {"more": "holds more on {0}", "less": "holds less on {0}", "alike": "cannot be told from it on {0}"}
 _EVERYWHERE = {"more": "each of these loops", "less": "each of these loops", "alike": "any of these loops"}
-_HELPS, _MIXED = "adaptive inertia helps there", "adaptive inertia is no remedy"
+_HELPS = "adaptive inertia helps there"
+_NO_BETTER = "adaptive inertia helps there, but nowhere more than all simpler elements do"
+_MIXED = "adaptive inertia is no remedy"
 _NOT = "adaptive inertia does not help, as far as can be told"
-_HEADS = ("element", "parameter", "wall", "held", "contact", "ripple", "extra", "±20 %", "device ±20 %", "breaks first")
-_STIFFNESSES = ("wall", "held", "contact")
+_HEADS = {
+    "element": "element", "parameter": "parameter", "wall": "wall, N/mm", "held": "held, N/mm",
+    "more": "more than none, N/mm", "contact": "contact, N/mm", "ripple": "ripple", "extra": "extra", "±20 %": "±20 %",
+    "device ±20 %": "device ±20 %", "breaks first": "breaks first",
+}  # fmt: skip
+_BESIDE = """\
+On like loops: what is held without any element, and how much more with each, N/mm. Parameters are searched about
+those above alone, {around} by {tuning} seeds, and tried by {seeds}."""
 _LIMITS = """\
 Seeds draw holds, sways, taps, device, hand and delay; they do not draw another friction, another hand or another task,
 and numbers that the device files assume are taken as they are. Parameters are tuned for what is held, not for the
-ripple. A virtual coupling holds less than its wall; force bounding counts on the damping that the device declares, and
-where that is 0 it lets no force pass. What is told as at the end of a search may be more with other parameters."""
+ripple. A virtual coupling holds less than its wall. What is told as at the end of a search may be more with other
+parameters."""
+
+# A loop by the names of its device and of itself.
+Loops = dict[tuple[str, str], OfLoop]
 
 
 def sentences(comparisons: Sequence[Comparison]) -> list[str]:
     """Returns the five sentences; each name of a loop in them is put there by a condition on its rankings."""
-    loops = repeated(comparisons)
-    helps = [_compared(ADAPTIVE_BOTH, ADAPTIVE_DAMPING, loops), _compared(ADAPTIVE_INERTIA, NOTHING, loops)]
-    more, less = (any(each[place] for each in helps) for place in ("more", "less"))
-    verdict = (_MIXED if less else _HELPS) if more else _NOT
-    others = (NOTHING, DAMPING, BIDIRECTIONAL)
-    stands = ". ".join(versus(UNIDIRECTIONAL, other, loops) for other in others)
+    loops = {(name_of(told), of.name): of for told in comparisons for of in told.loops}
+    taken: dict[str, list[tuple[str, str]]] = {}
+    for place, of in loops.items():
+        taken.setdefault(choice(of).family, []).append(place)
+    firsts = "; ".join(_first(name_of(told), told.loops[0]) for told in comparisons)
+    stands = ". ".join(versus(UNIDIRECTIONAL, other, loops) for other in (NOTHING, DAMPING, BIDIRECTIONAL))
+    adaptive = f"{versus(ADAPTIVE_BOTH, ADAPTIVE_DAMPING, loops)}. {versus(ADAPTIVE_INERTIA, NOTHING, loops)}"
     return [
-        _MOST.format("; ".join(f"on {name}: {_first(of)}" for name, of in loops.items())),
-        _TAKE.format("; ".join(f"on {name} {simplest(of)}" for name, of in loops.items())),
+        f"Most is held, as described, on {firsts}.",
+        f"Take {'; '.join(f'{family} on {places(of, loops)}' for family, of in taken.items())}: on each the first in "
+        "the list of those that are told to hold more than no element, and less than no other.",
         f"{versus(DAMPING, NOTHING, loops)}.",
         f"{stands}.",
-        f"{versus(ADAPTIVE_BOTH, ADAPTIVE_DAMPING, loops)}. {versus(ADAPTIVE_INERTIA, NOTHING, loops)}: {verdict}.",
+        f"{adaptive}: {_verdict(loops)}.",
     ]
 
 
-def repeated(comparisons: Sequence[Comparison]) -> dict[str, OfLoop]:
-    """Returns the loops that were tried under both sets of seeds, by device and round-trip delay."""
-    return {f"{told.name} at {of.delay_s * 1e3:g} ms": of for told in comparisons for of in told.loops if of.again}
+def name_of(told: Comparison) -> str:
+    """Returns the device with the round trip of its first loop."""
+    return f"{told.name} at {told.loops[0].delay_s * 1e3:g} ms"
 
 
-def simplest(of: OfLoop) -> str:
-    """Returns the first in the list of stabilizers of those that cannot be told from the best."""
-    found, tied = best(of)
-    return next(row.family for row in of.rows if row is found or row in tied)
-
-
-def versus(some: Family, other: Family, loops: dict[str, OfLoop]) -> str:
-    """Says where some family renders more than another, where less, and where it cannot be told from it."""
+def versus(some: Family, other: Family, loops: Loops) -> str:
+    """Says where some family holds more than another, where less, and where it cannot be told from it."""
     where = _compared(some, other, loops)
-    places = {word: _EVERYWHERE[word] if len(names) == len(loops) else join(names) for word, names in where.items()}
-    told = "; it ".join(_WHERE[word].format(place) for word, place in places.items() if where[word])
+    at = {word: _EVERYWHERE[word] if len(of) == len(loops) else places(of, loops) for word, of in where.items()}
+    told = "; it ".join(_WHERE[word].format(place) for word, place in at.items() if where[word])
     return f"{_capital(some.name)} against {other.name}: it {told}"
 
 
-def _compared(some: Family, other: Family, loops: dict[str, OfLoop]) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {"more": [], "less": [], "alike": []}
-    for name, of in loops.items():
-        found[ranking(of).versus(some.name, other.name)].append(name)
+def places(of: Sequence[tuple[str, str]], loops: Loops) -> str:
+    """Names loops by device: ``every loop of touch``, or ``touch (as described, drive of 100 Hz)``."""
+    words = []
+    for device in dict.fromkeys(device for device, _ in of):
+        named, every = [name for on, name in of if on == device], [name for on, name in loops if on == device]
+        is_all = len(named) == len(every)
+        words.append(
+            (f"every loop of {device}" if len(every) > 1 else device) if is_all else f"{device} ({', '.join(named)})"
+        )
+    return join(words)
+
+
+def _compared(some: Family, other: Family, loops: Loops) -> dict[str, list[tuple[str, str]]]:
+    found: dict[str, list[tuple[str, str]]] = {"more": [], "less": [], "alike": []}
+    for place, of in loops.items():
+        found[ranking(of).versus(some.name, other.name)].append(place)
     return found
 
 
-def _first(of: OfLoop) -> str:
+def _verdict(loops: Loops) -> str:
+    """Says whether inertia of an adaptive element helps: on some loop, and whether it is what to take on any."""
+    pairs = ((ADAPTIVE_BOTH, ADAPTIVE_DAMPING), (ADAPTIVE_INERTIA, NOTHING))
+    helps = [_compared(*pair, loops) for pair in pairs]
+    if not any(each["more"] for each in helps):
+        return _NOT
+    if any(each["less"] for each in helps):
+        return _MIXED
+    adaptive = (ADAPTIVE_INERTIA.name, ADAPTIVE_BOTH.name)
+    is_taken = any(choice(of).family in adaptive for of in loops.values())
+    return _HELPS if is_taken else _NO_BETTER
+
+
+def _first(device: str, of: OfLoop) -> str:
     found, tied = best(of)
-    without = next(row for row in of.rows if row.family == NOTHING.name)
-    if without is found or without in tied:
-        return f"no element holds more than none, {format_stiffness(held(without).value)}, as far as can be told"
+    alone = format_stiffness(held(without(of.rows)).value)
+    if choice(of).family == NOTHING.name:
+        return f"{device} by no element more than by none, {alone}"
     alike = f", not told from {join([row.family for row in tied])}" if tied else ", more than every other"
-    return f"{found.family}, {format_stiffness(held(found).value)}{alike}"
+    return f"{device} by {found.family}, {format_stiffness(held(found).value)} against {alone} without{alike}"
 
 
 def _capital(words: str) -> str:
@@ -112,23 +150,26 @@ def page(comparisons: Sequence[Comparison]) -> str:
     """Returns the page in Markdown."""
     lines = [f"{place}. {words}" for place, words in enumerate(sentences(comparisons), 1)]
     parts = ["# Stabilizers compared", _INTRO, "## In five sentences", "\n".join(lines)]
-    parts += [f"![What every stabilizer holds, with intervals, and the force it adds]({FIGURE})"]
+    parts += [f"![How much more every stabilizer holds, with intervals, and the force it adds]({FIGURE})"]
     parts += [f"{READING} {task_sentence(comparisons[0])}"]
     for told in comparisons:
-        parts += [f"## {told.name}", " ".join(told.notes)]
-        for of in told.loops:
-            if of.again:
-                heads = [f"{name}, N/mm" if name in _STIFFNESSES else name for name in _HEADS]
-                rows = [[cells(row)[name] for name in _HEADS] for row in of.rows]
-                parts += [f"### {of.name}, round trip {of.delay_s * 1e3:g} ms", most_sentence(of), again_sentence(of)]
-                parts += [markdown_table(heads, rows, range(2, 5))]
-        others = [of for of in told.loops if not of.again]
+        first, *others = told.loops
+        parts += [f"## {told.name}, round trip {first.delay_s * 1e3:g} ms", " ".join(told.notes)]
+        parts += [most_sentence(first), again_sentence(first), hidden_sentence(first), _table(first)]
         if others:
-            rows = [[some[0].family, *(cells(row)["held"] for row in some)]
-                    for some in zip(*(of.rows for of in others), strict=True)]  # fmt: skip
-            parts += ["Held on like loops, N/mm, under one set of seeds and not ranked:"]
-            parts += [markdown_table(["element", *(of.name for of in others)], rows)]
+            rows = loops_rows(told.loops)
+            parts += [_BESIDE.format(**vars(told.beside))]
+            parts += [markdown_table(["element", *(of.name for of in told.loops)], rows)]
     return "\n\n".join(filter(None, [*parts, "## What it does not say", _LIMITS])) + "\n"
+
+
+def _table(of: OfLoop) -> str:
+    found, tied = best(of)
+    rows = [[cells(row, of)[name] for name in _HEADS] for row in shows_walls(of.rows)]
+    for row, words in zip(shows_walls(of.rows), rows, strict=True):
+        if row is found or row in tied:
+            words[0] = f"**{words[0]}**"
+    return markdown_table([*_HEADS.values()], rows, range(2, 4))
 
 
 def write(directory: Path, docs: Path) -> Path:

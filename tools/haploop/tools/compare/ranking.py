@@ -2,18 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from itertools import combinations
 from typing import NamedTuple
 
+from haploop.tools.advise.families import NOTHING
 from haploop.tools.compare.bench import Row
 from haploop.tools.compare.comparison import OfLoop
 from haploop.tools.search.intervals import Interval, mean_interval
+
+# What holds less than this share of what is held without any element hides every wall.
+_SHOWS = 0.1
 
 
 def held(row: Row) -> Interval:
     """Returns the stiffness that is rendered while the wall is held, with its interval over the seeds, N/m."""
     return mean_interval([each.rendered.held_N_m for each in row.seeds])
+
+
+def more(row: Row, than: Row) -> Interval:
+    """Returns how much more is held than with another stabilizer, N/m: both bear the same conditions under a seed, so
+    that differences are taken seed by seed."""
+    both = zip(row.seeds, than.seeds, strict=True)
+    return mean_interval([one.rendered.held_N_m - other.rendered.held_N_m for one, other in both])
+
+
+def without(rows: Sequence[Row]) -> Row:
+    """Returns the row of no element."""
+    return next(row for row in rows if row.family == NOTHING.name)
+
+
+def shows_walls(rows: Sequence[Row]) -> list[Row]:
+    """Returns the rows that are worth a ranking: those that hold a tenth of what is held without any element."""
+    least = _SHOWS * held(without(rows)).value
+    return [row for row in rows if held(row).value >= least]
 
 
 class Ranking(NamedTuple):
@@ -36,22 +58,18 @@ class Ranking(NamedTuple):
         return "less" if (other, some) in self.reproduced else "alike"
 
 
-def apart(rows: Iterable[Row]) -> frozenset[tuple[str, str]]:
-    """Returns the pairs, the larger first, whose mean difference has an interval without 0.
-
-    Every stabilizer bears the same conditions under a seed, so that differences are taken seed by seed.
-    """
+def apart(rows: Sequence[Row]) -> frozenset[tuple[str, str]]:
+    """Returns the pairs, the larger first, whose mean difference has an interval without 0."""
     pairs = set[tuple[str, str]]()
-    for some, other in combinations(rows, 2):
-        both = zip(some.seeds, other.seeds, strict=True)
-        inside = mean_interval([one.rendered.held_N_m - than.rendered.held_N_m for one, than in both])
+    for some, other in combinations(shows_walls(rows), 2):
+        inside = more(some, other)
         if inside.low > 0.0 or inside.high < 0.0:
             pairs.add((some.family, other.family) if inside.low > 0.0 else (other.family, some.family))
     return frozenset(pairs)
 
 
 def ranking(of: OfLoop) -> Ranking:
-    """Returns the ranking of a loop; without other seeds nothing is reproduced."""
+    """Returns the ranking of a loop."""
     told, again = apart(of.rows), apart(of.again)
     contradicted = frozenset((more, less) for more, less in told if (less, more) in again)
     return Ranking(told, told & again, contradicted)
@@ -59,5 +77,15 @@ def ranking(of: OfLoop) -> Ranking:
 
 def best(of: OfLoop) -> tuple[Row, list[Row]]:
     """Returns the row that renders most, and those that cannot be told from it under both sets of seeds, as listed."""
-    found, order = max(of.rows, key=lambda row: held(row).value), ranking(of)
-    return found, [row for row in of.rows if row is not found and order.versus(found.family, row.family) == "alike"]
+    rows, order = shows_walls(of.rows), ranking(of)
+    found = max(rows, key=lambda row: held(row).value)
+    return found, [row for row in rows if row is not found and order.versus(found.family, row.family) == "alike"]
+
+
+def choice(of: OfLoop) -> Row:
+    """Returns what to take: the first in the list that is told to hold more than no element, and less than no other; no
+    element where none is."""
+    order = ranking(of)
+    gains = [row for row in of.rows if order.versus(row.family, NOTHING.name) == "more"]
+    unbeaten = [row for row in gains if all(order.versus(row.family, other.family) != "less" for other in gains)]
+    return [*unbeaten, without(of.rows)][0]

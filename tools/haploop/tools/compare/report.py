@@ -14,23 +14,26 @@ from haploop.tools.advise.families import NOTHING
 from haploop.tools.advise.report import format_stiffness
 from haploop.tools.compare.bench import MOST_N_M, Row, family_of
 from haploop.tools.compare.comparison import Comparison, OfLoop
-from haploop.tools.compare.ranking import best, held, ranking
+from haploop.tools.compare.ranking import best, choice, held, more, ranking, shows_walls, without
 from haploop.tools.render.terminal import make_facts, make_table
 from haploop.tools.render.units import amount, fixed
 from haploop.tools.search.intervals import mean_interval
 
 READING = (
     "Wall: the stiffest of a seed's conditions that is safe, as are all softer ones tried, mean of the seeds. Held: "
-    "mean force over mean penetration, with its 95 % interval over the seeds. Contact: slope of the force on the first "
-    "way in. Ripple: of the command above 30 Hz, peak to peak. Extra: the element's own force, largest and root mean "
-    "square. ±20 %: what is held with all parameters, or the device, 20 % less and 20 % more, over that without. * a "
-    "parameter at the end of its search, † no wall was too stiff: what is told may be more elsewhere. Two are "
-    "apart where the interval of their difference, seed by seed under the same conditions, does not hold 0; ranked is "
-    "what is apart under two sets of seeds, tuning included. Bold: those not told from the best."
+    "mean force over mean measured penetration. More than none: the same less what is held without any element, mean "
+    "and 95 % interval of the differences seed by seed. Contact: slope of the force on the first way in. Ripple: of "
+    "the command above 30 Hz, peak to peak. Extra: the element's own force, largest and root mean square. ±20 %: what "
+    "is held with all parameters, or the device, 20 % less and 20 % more, over that without. * a parameter at the end "
+    "of its search, † no wall was too stiff: what is told may be more elsewhere. Two are apart where the interval of "
+    "their difference does not hold 0; told apart is what is so under two sets of seeds, tuning included. Bold: those "
+    "not told from the best; ▲ ▼ those that are told to hold more, or less, than none."
 )
+SIGNS = {"more": " ▲", "less": " ▼", "alike": ""}
 _TIED = "{0} renders most, {1}; it cannot be told apart from {2}."
-_NO_GAIN = "{0} renders most, {1}, but cannot be told apart from no element, {2}."
+_NO_GAIN = "No element can be told to hold more than none, {0}."
 _FIRST = "{0} renders most, {1}, and more than every other."
+_HIDES = "Left out: {0} hides every wall and holds {1}, whatever is rendered."
 _AGAIN = "{0} of {1} pairs that are apart are so under other seeds, tuning included; {2} are the other way round."
 
 
@@ -41,7 +44,7 @@ def report(told: Comparison) -> RenderableType:
         Text(f"All stabilizers on {told.name}, each tuned alike.", style="bold"),
         make_facts([("most", most_sentence(first)), ("again", again_sentence(first))], least_width=7),
         Text(),
-        *(Text(note, style="dim") for note in told.notes),
+        *(Text(note, style="dim") for note in filter(None, [*told.notes, hidden_sentence(first)])),
         _rendered(first),
         _costs(first),
         Text(task_sentence(told), style="dim"),
@@ -52,21 +55,29 @@ def report(told: Comparison) -> RenderableType:
 
 def task_sentence(told: Comparison) -> str:
     effort = told.effort
+    sets = effort.points + effort.finalists + effort.around + 1
     return (
-        f"Tried by {told.task}: {effort.cases} such conditions tune {2 * effort.points + 1} sets of parameters each, "
-        f"{effort.seeds} seeds of {effort.of_seed} others try the best one. So the walls are for "
-        "comparing, not for building: `haploop advise` tries one in some thousand cases."
+        f"Tried by {told.task}; a seed draws {effort.of_seed} such conditions. {sets} sets of parameters each: "
+        f"{effort.points + 1} by {effort.first} seeds, the best {effort.finalists} and {effort.around} about them by "
+        f"{effort.tuning}; then the best one by {effort.seeds} others. So the walls are for comparing, not for "
+        "building: `haploop advise` tries one in some thousand cases."
     )
 
 
 def most_sentence(of: OfLoop) -> str:
     """Says what renders most, and what cannot be told from it under both sets of seeds."""
     found, tied = best(of)
-    without = next(row for row in of.rows if row.family == NOTHING.name)
-    if without is found or without in tied:
-        return _NO_GAIN.format(with_parameters(found), *(format_stiffness(held(row).value) for row in (found, without)))
+    if choice(of).family == NOTHING.name:
+        return _NO_GAIN.format(format_stiffness(held(without(of.rows)).value))
     name, value = with_parameters(found), format_stiffness(held(found).value)
     return _TIED.format(name, value, join([row.family for row in tied])) if tied else _FIRST.format(name, value)
+
+
+def hidden_sentence(of: OfLoop) -> str:
+    """Says of elements that are in no table what they hold; nothing where there are none."""
+    shown = shows_walls(of.rows)
+    return " ".join(_HIDES.format(with_parameters(row), format_stiffness(held(row).value))
+                    for row in of.rows if row not in shown)  # fmt: skip
 
 
 def again_sentence(of: OfLoop) -> str:
@@ -84,9 +95,8 @@ def join(names: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
 
 
-def cells(row: Row) -> dict[str, str]:
-    """Formats all that is told of a row."""
-    inside = held(row)
+def cells(row: Row, of: OfLoop) -> dict[str, str]:
+    """Formats all that is told of a row on its loop."""
     shown = [each.rendered for each in row.seeds]
     wall = float(np.mean([each.wall_N_m for each in row.seeds]))
     marks = ("†" if "wall" in row.at_edge else "") + ("*" if set(row.at_edge) - {"wall"} else "")
@@ -99,7 +109,8 @@ def cells(row: Row) -> dict[str, str]:
         "element": row.family,
         "parameter": family_of(row.family).words(row.values) + marks,
         "wall": fixed(min(wall, MOST_N_M) / 1e3),
-        "held": f"{fixed(inside.value / 1e3)} ({fixed(max(0.0, inside.low) / 1e3)}–{fixed(inside.high / 1e3)})",
+        "held": fixed(mean("held_N_m") / 1e3),
+        "more": gain(row, of),
         "contact": fixed(mean("contact_N_m") / 1e3),
         "ripple": amount(mean("ripple_N"), "N", 2) if is_safe else "–",
         "extra": f"{amount(mean('extra_N'), 'N', 2)}, {amount(mean('extra_rms_N'), 'N', 2)}" if row.values else "–",
@@ -109,33 +120,38 @@ def cells(row: Row) -> dict[str, str]:
     }
 
 
+def gain(row: Row, of: OfLoop) -> str:
+    """Formats how much more is held than with no element, N/mm, and whether that is told: ``+0.3 (+0.1 to +0.5) ▲``."""
+    if row.family == NOTHING.name:
+        return "–"
+    inside = more(row, without(of.rows))
+    value, low, high = (f"{end / 1e3:+.2f}".replace("-", "−") for end in inside)
+    return f"{value} ({low} to {high}){SIGNS[ranking(of).versus(row.family, NOTHING.name)]}"
+
+
 def _shares(shares: Sequence[float]) -> str:
     return ", ".join(fixed(share, 2) for share in shares) or "–"
 
 
-def _table(of: OfLoop, heads: dict[str, str], numbers: Sequence[str]) -> Table:
-    table = make_table(*heads.values(), numbers=[heads[name] for name in numbers], padding=(0, 0, 0, 0))
+def _table(of: OfLoop, heads: dict[str, str], numbers: Sequence[str], padding: int) -> Table:
+    table = make_table(*heads.values(), numbers=[heads[name] for name in numbers], padding=(0, padding, 0, 0))
     found, tied = best(of)
-    for row in of.rows:
-        told = cells(row)
+    for row in shows_walls(of.rows):
+        told = cells(row, of)
         table.add_row(*(told[name] for name in heads), style="bold" if row is found or row in tied else "")
     return table
 
 
 def _rendered(of: OfLoop) -> Table:
     heads = {"element": "element", "parameter": "parameter", "wall": "wall\nN/mm", "held": "held\nN/mm",
-             "contact": "contact\nN/mm"}  # fmt: skip
-    return _table(of, heads, ("wall", "held", "contact"))
+             "more": "more than none\nN/mm", "contact": "contact\nN/mm"}  # fmt: skip
+    return _table(of, heads, ("wall", "held", "contact"), 0)
 
 
 def _costs(of: OfLoop) -> Table:
     heads = {"element": "element", "ripple": "ripple", "extra": "extra", "±20 %": "±20 %",
              "device ±20 %": "device\n±20 %", "breaks first": "breaks first"}  # fmt: skip
-    table = make_table(*heads.values(), numbers=[heads["ripple"]])
-    for row in of.rows:
-        told = cells(row)
-        table.add_row(*(told[name] for name in heads))
-    return table
+    return _table(of, heads, ("ripple",), 1)
 
 
 def _breaks(row: Row) -> str:
@@ -148,12 +164,21 @@ def _breaks(row: Row) -> str:
     return f"{fixed(worst.fails_N_m / 1e3, 2)} N/mm, {swing}, {hold}"
 
 
+def loops_rows(loops: Sequence[OfLoop]) -> list[list[str]]:
+    """Makes the rows of a table of what is held on every loop: without any element, and how much more with each."""
+    shown = [[row.family for row in shows_walls(of.rows)] for of in loops]
+    rows = [[NOTHING.name, *(f"{held(without(of.rows)).value / 1e3:.2f}" for of in loops)]]
+    for alike in zip(*(of.rows for of in loops), strict=True):
+        if alike[0].family != NOTHING.name and all(alike[0].family in some for some in shown):
+            cells = [gain(row, of) for row, of in zip(alike, loops, strict=True)]
+            rows.append([alike[0].family, *cells])
+    return rows
+
+
 def _others(loops: Sequence[OfLoop]) -> Table:
-    """Makes the table of what is held on every loop, in N/mm."""
-    heads = ["element", *(of.name for of in loops)]
-    table = make_table(*heads, numbers=())
-    for rows in zip(*(of.rows for of in loops), strict=True):
-        table.add_row(rows[0].family, *(cells(row)["held"] for row in rows))
+    table = make_table("held, N/mm: without;\nhow much more with", *(of.name for of in loops), numbers=())
+    for row in loops_rows(loops):
+        table.add_row(*row)
     return table
 
 

@@ -25,7 +25,8 @@ class Buzz(NamedTuple):
 
     Attributes:
         turns: times that the measured position (the true one without an encoder) changed its direction.
-        motion_m, force_N: what position and command swing by, peak to peak, see ``_ripple``.
+        motion_m, force_N: what position and command swing by, peak to peak, see ``ripple``; 0 where it does not go to
+            and fro.
         frequency_Hz: of whichever is felt more.
         times_felt: the larger of both as a multiple of what is felt; 0 where it does not go to and fro.
         by_force: whether that is the force.
@@ -70,12 +71,13 @@ def buzz(x: np.ndarray, measured: np.ndarray, command: np.ndarray, rate: float, 
     fro. So the measured position has to turn ``TURNS`` times before anything counts.
     """
     turns = _turns(measured)
-    motion, f_motion = _ripple(x, rate)
-    force, f_force = _ripple(command, rate)
+    (motion, f_motion), (force, f_force) = (np.zeros((2, len(turns))) for _ in range(2))
+    swings = np.flatnonzero(turns >= TURNS)
+    motion[swings], f_motion[swings] = ripple(x[:, swings], rate)
+    force[swings], f_force[swings] = ripple(command[:, swings], rate)
     by_motion, by_force = motion / felt_m(f_motion), force / felt_N(f_force)
-    strongest = np.where(turns >= TURNS, np.maximum(by_motion, by_force), 0.0)
     frequency = np.where(by_force > by_motion, f_force, f_motion)
-    return Buzz(turns, motion, force, frequency, strongest, by_force > by_motion)
+    return Buzz(turns, motion, force, frequency, np.maximum(by_motion, by_force), by_force > by_motion)
 
 
 def _turns(u: np.ndarray) -> np.ndarray:
@@ -88,7 +90,7 @@ def _turns(u: np.ndarray) -> np.ndarray:
     return (held[1:] * held[:-1] < 0.0).sum(axis=0)
 
 
-def _ripple(u: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
+def ripple(u: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
     """Returns what each column swings by, peak to peak, faster than ``TURNS`` turns a stretch, and how fast in Hz.
 
     The column's parabola is taken off first: a hand that sways would leave steps at the ends.

@@ -10,7 +10,7 @@ import numpy as np
 
 from haploop.protocol.scene.scene import Clock, Wall
 from haploop.tools.advise.walls.cases import LASTS_S, slowness
-from haploop.tools.advise.walls.felt import buzz, felt_m
+from haploop.tools.advise.walls.felt import ripple
 from haploop.tools.advise.walls.limit import Query, limits
 from haploop.tools.advise.walls.loops import Seen, make_loops
 from haploop.tools.advise.walls.trial import FROM_S, STRETCH_S, Failure, Trial
@@ -24,8 +24,9 @@ class Rendered(NamedTuple):
     """What a wall renders, over all cases of a query; 0 throughout where no wall is safe.
 
     Attributes:
-        held_N_m: mean force over mean penetration, from 0.75 s on; the force is the one that acts, a delay later.
-        contact_N_m: slope of the same force over penetration, by least squares, on the first way in.
+        held_N_m: mean force over mean penetration as it is measured, from 0.75 s on; the force is the one that acts, a
+            delay later.
+        contact_N_m: slope of the same force over the true penetration, by least squares, on the first way in.
         ripple_N: largest peak to peak of the command above 30 Hz in a quarter of a second, mean of the cases.
         extra_N, extra_rms_N: largest and root mean square force of the elements.
     """
@@ -96,20 +97,19 @@ def _measure(seen: Seen, stiffness_N_m: np.ndarray, clock: Clock) -> list[Render
     acts = np.roll(seen.command, late_ticks := round(clock.round_trip_delay * rate), axis=0)
     acts[:late_ticks] = 0.0
     depth, force = np.maximum(-seen.x, 0.0), np.where(seen.x < 0.0, acts, 0.0)
-    late = slice(round(FROM_S * rate), None)
-    held = _share(force[late].sum(axis=0), depth[late].sum(axis=0))
+    read, late = np.maximum(-seen.measured, 0.0), slice(round(FROM_S * rate), None)
+    held = _share(force[late].sum(axis=0), read[late].sum(axis=0))
     # The first way in: from contact until the device first moves out, or does not move.
     inside = np.maximum.accumulate(depth > 0.0, axis=0)
     out = np.diff(depth, axis=0, prepend=0.0) <= 0.0
     way_in = inside & ~np.logical_or.accumulate(inside & out, axis=0)
     contact = _share((way_in * force * depth).sum(axis=0), (way_in * depth * depth).sum(axis=0))
-    stretch, ripple = round(STRETCH_S * rate), np.zeros(seen.x.shape[1])
+    stretch, swing = round(STRETCH_S * rate), np.zeros(seen.x.shape[1])
     for at in range(late.start, len(seen.x) - stretch + 1, stretch):
-        part = slice(at, at + stretch)
-        ripple = np.maximum(ripple, buzz(seen.x[part], seen.measured[part], seen.command[part], rate, felt_m).force_N)
-    extra = seen.command - stiffness_N_m * np.maximum(-seen.measured, 0.0)
+        swing = np.maximum(swing, ripple(seen.command[at : at + stretch], rate)[0])
+    extra = seen.command - stiffness_N_m * read
     peak, rms = np.abs(extra).max(axis=0), np.sqrt((extra**2).mean(axis=0))
-    return [Rendered(*row) for row in np.stack([held, contact, ripple, peak, rms], axis=1).tolist()]
+    return [Rendered(*row) for row in np.stack([held, contact, swing, peak, rms], axis=1).tolist()]
 
 
 def _share(force: np.ndarray, depth: np.ndarray) -> np.ndarray:

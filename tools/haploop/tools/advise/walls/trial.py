@@ -75,7 +75,7 @@ class Store:
     """
 
     def __init__(self, file: Path | None = None) -> None:
-        self._file = file
+        self._file, self._version = file, version("haploop")
         self.known: dict[str, Failure | None] = {}
         with self._writable():
             text = file.read_text(encoding="utf-8", errors="replace") if file and file.exists() else ""
@@ -86,7 +86,7 @@ class Store:
 
     def key(self, loop: Scene, wall: Tried, cases: Sequence[Case]) -> str:
         """Returns the key of a trial: loop, wall, cases and the version of haploop."""
-        told = repr((version("haploop"), loop, wall, tuple(cases)))
+        told = repr((self._version, loop, wall, tuple(cases)))
         return hashlib.sha256(told.encode()).hexdigest()[:24]
 
     def add(self, results: Mapping[str, Failure | None]) -> None:
