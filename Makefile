@@ -69,9 +69,6 @@ paper: $(READY) ## make every figure of the paper, write docs/paper.md and paper
 	@cp runs/paper/premium_press.toml launch/scenes/
 
 comparison: $(READY) ## compare every stabilizer on three devices and write docs/comparison.md (20 minutes on two quiet cores; stopped, it goes on)
-	@$(BIN)/haploop compare premium15_cable --out runs/comparison/premium15_cable
-	@$(BIN)/haploop compare touch --delay "1 ms" --out runs/comparison/touch
-	@$(BIN)/haploop compare omega3 --delay "1 ms" --out runs/comparison/omega3
 	@$(BIN)/python -m haploop.tools.compare.page runs/comparison docs
 
 docs: $(READY) ## make the documentation as a site in site/ (index.html); a warning is an error

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from haploop.tools.advise.walls.felt import TURNS, buzz, felt_force_N, felt_m
+from haploop.tools.advise.walls.felt import TURNS, buzz, felt_force_N, felt_m, ripple
 from helpers.scenes.least import scene
 
 RATE, T = 1000.0, np.arange(250) / 1000.0
@@ -18,8 +18,9 @@ def seen(x, q=0.0, stiffness=3000.0):
 
 
 def test_a_staircase_under_a_swaying_hand_is_no_buzz_though_its_force_steps():
-    sway = seen(-3e-4 - 1e-4 * np.sin(np.pi * T), q=28.7e-6)
-    assert sway.force_N[0] > 0.08
+    x, q = -3e-4 - 1e-4 * np.sin(np.pi * T[:, None]), 28.7e-6
+    sway = seen(x, q)
+    assert ripple(-3000.0 * q * np.rint(x / q), RATE)[0][0] > 0.08
     assert sway.turns[0] < TURNS
     assert sway.times_felt[0] == 0.0
 

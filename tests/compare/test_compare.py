@@ -1,5 +1,6 @@
 """The comparison of stabilizers: one search for all, what is measured of a wall, what is told apart, what is said."""
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ import pytest
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Encoder, Scene
 from haploop.tools.advise import families
-from haploop.tools.advise.families import STABILIZERS, Family, Values, applies, halton
+from haploop.tools.advise.families import STABILIZERS, Family, halton
 from haploop.tools.advise.subject import make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop, ranges
 from haploop.tools.advise.walls.limit import Query
@@ -18,7 +19,7 @@ from haploop.tools.advise.walls.rendered import Rendered, Trying, rendered, trie
 from haploop.tools.advise.walls.trial import Store, Trial
 from haploop.tools.compare import bench as of_bench
 from haploop.tools.compare.bench import BESIDE, Effort, Job, Row, along, bench
-from haploop.tools.compare.comparison import AGAIN, TOLD, Comparison, Kept, OfLoop, as_comparison
+from haploop.tools.compare.comparison import AGAIN, TOLD, Comparison, Kept, OfLoop, bounded_N_m, plays
 from haploop.tools.compare.conditions import draw
 from haploop.tools.compare.page import page, places, sentences
 from haploop.tools.compare.ranking import best, choice, held, ranking
@@ -87,21 +88,21 @@ def test_every_stabilizer_has_the_same_effort_and_the_search_goes_where_most_is_
 ):
     """In place of loops: a hill of what is held over the parameters, highest in the middle of their box."""
     ends = families.box(family, loop := loop_of("touch", "clock.round_trip_delay=1e-3"), 1000.0)
-    asked: list[tuple[Values, int]] = []
+    asked: list[int] = []
 
     def hill(_: Trial, queries: list[Query], tolerance: float) -> list[Trying]:
         values = [tuple(v for table in query.elements for v in table.parameters.values()) for query in queries]
         off = [sum((np.log(v / (low * high) ** 0.5) / np.log(high / low)) ** 2
                    for v, (low, high) in zip(some, ends, strict=True)) for some in values]  # fmt: skip
-        asked.append((values, len(queries)))
+        asked.append(len(queries))
         return [Trying(1000.0, 1000.0, Rendered(1000.0 - 500.0 * each), np.inf, None) for each in off]
 
     monkeypatch.setattr(of_bench, "tried", hill)
     effort = Effort()
     rows = bench(Job(loop, family.name, 1000.0, ((TOLD, None), (AGAIN, None)), effort))
-    *tuning, (_, trial) = asked
+    *tuning, trial = asked
     if family.parts:
-        first, second = (count / 2 for _, count in tuning)
+        first, second = (count / 2 for count in tuning)
         assert first == effort.first * (effort.points + 1)
         assert effort.tuning * effort.around <= second <= effort.tuning * (effort.finalists + effort.around)
     else:
@@ -203,11 +204,13 @@ def test_no_ranking_of_the_page_is_the_other_way_round_under_other_seeds():
     assert all(other == "0" for *_, other in said)
 
 
-def test_page_and_report_are_made_of_what_was_written():
+def test_page_and_report_have_every_element_and_fit_into_a_terminal():
     told = compared(bidirectional_inertia=2000.0)
-    again = as_comparison(comparison_data(told))
-    assert page([again]) == page([told])
-    assert "bidirectional inertia" in page([told])
+    words = page([told, told])
+    assert all(family.name in words for family in STABILIZERS)
+    assert "**bidirectional inertia**" in words
+    assert "+1.00 (+1.00 to +1.00) ▲" in words
+    json.dumps(comparison_data(told))
     assert max(map(len, shown(report(told), 80).splitlines())) <= 80
 
 
@@ -224,10 +227,14 @@ def test_what_is_kept_survives_a_line_that_was_cut_off(tmp_path):
     assert Kept(tmp_path / "rows.jsonl").get("c") == 2.0
 
 
-def test_force_bounding_is_left_out_where_the_device_declares_no_damping():
+def test_force_bounding_holds_two_b_over_t_and_is_left_out_where_that_is_next_to_nothing(smooth: Scene):
     bounding = families.FORCE_BOUNDING
-    assert not applies(bounding, loop_of("premium15_cable"))
-    assert applies(bounding, loop_of("touch"))
+    [found] = rendered([Query(smooth, bounding.elements((1.0,)), (Case(0.3, sway=0.0),), ())], [2000.0])
+    assert found.held_N_m == pytest.approx(bounded_N_m(smooth), rel=0.1)
+    assert bounded_N_m(smooth) == pytest.approx(20.0)
+    assert plays(bounding, smooth, 150.0)
+    assert not plays(bounding, smooth, 250.0)
+    assert plays(families.DAMPING, smooth, 250.0)
 
 
 @pytest.mark.slow

@@ -52,13 +52,13 @@ class Effort:
     finalists: int = 3
     around: int = 6
     tuning: int = 6
-    seeds: int = 16
+    seeds: int = 32
     moved: int = 6
     of_seed: int = 3
 
 
 # Where the parameters of a like loop are known, the search begins and ends about them.
-BESIDE = Effort(points=0, finalists=1, tuning=4, seeds=8, moved=0)
+BESIDE = Effort(points=0, finalists=1, tuning=3, seeds=16, moved=0)
 
 
 @dataclass(frozen=True)

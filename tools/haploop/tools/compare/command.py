@@ -11,7 +11,10 @@ import typer
 
 from haploop.tools.cli.options import FAILED, WRONG_USE, Json, Plugin, Set, leave, plain_errors, print_json
 
-_NO_BOUND = "Force bounding is left out: it counts on the damping that the device declares, which is 0 here."
+_NO_BOUND = (
+    "Force bounding is left out: of any wall that is pressed slowly it holds 2 b / T, b the damping that the device "
+    "declares, here {0}."
+)
 ROWS, COMPARISON, FIGURE = "rows.jsonl", "comparison.json", "comparison.png"
 
 if TYPE_CHECKING:
@@ -61,10 +64,11 @@ def compare(
 
 def find(subject: Subject, grid: bool, workers: int | None, rows: Path) -> Comparison:
     """Compares the stabilizers on a subject's loop, with ``grid`` on others like it; ``rows`` keeps what was found."""
-    from haploop.tools.advise.families import FORCE_BOUNDING, applies
+    from haploop.tools.advise.families import FORCE_BOUNDING
+    from haploop.tools.advise.report import format_stiffness
     from haploop.tools.advise.walls.cases import make_loop
     from haploop.tools.compare.bench import BESIDE, Effort
-    from haploop.tools.compare.comparison import Comparison, Kept, compare, variants
+    from haploop.tools.compare.comparison import Comparison, Kept, bounded_N_m, compare, variants
     from haploop.tools.compare.conditions import task_words
     from haploop.tools.executor.executors import make_executor
     from haploop.tools.render.progress import bars
@@ -75,7 +79,8 @@ def find(subject: Subject, grid: bool, workers: int | None, rows: Path) -> Compa
         loops = dict([*loops.items()][:1])
     with bars() as stage, make_executor(workers) as executor:
         found = compare(loops, effort, BESIDE, Kept(rows), executor, stage)
-    notes = [*subject.notes, *([] if applies(FORCE_BOUNDING, loop) else [_NO_BOUND])]
+    is_left_out = all(row.family != FORCE_BOUNDING.name for row in found[0].rows)
+    notes = [*subject.notes, *[_NO_BOUND.format(format_stiffness(bounded_N_m(loop)))] * is_left_out]
     return Comparison(subject.name, task_words(loop), tuple(notes), effort, BESIDE, found)
 
 

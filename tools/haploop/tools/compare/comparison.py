@@ -15,7 +15,7 @@ from typing import Any
 
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Actuator, Scene
-from haploop.tools.advise.families import STABILIZERS, Values, applies
+from haploop.tools.advise.families import FORCE_BOUNDING, STABILIZERS, Family, Values
 from haploop.tools.advise.walls.rendered import Rendered, Trying
 from haploop.tools.advise.walls.trial import Failure
 from haploop.tools.compare.bench import Effort, Job, Row, alone, bench
@@ -25,6 +25,8 @@ from haploop.tools.render.progress import Stage
 DESCRIBED = "as described"
 # Seeds that are told, and those that rankings are held against: tuning and trial have others.
 TOLD, AGAIN = 1, 2
+# What holds less than this share of what is held without any element hides every wall.
+_SHOWS = 0.1
 _LATER_S, _FINER, _DRIVE_HZ = 1e-3, 0.25, 100.0
 
 
@@ -116,14 +118,14 @@ def compare(
     found: dict[tuple[str, str], tuple[Row, ...]] = {}
     alone_N_m = _each(alone, loops, kept, executor, stage, "walls without any element", float)
     main, *others = loops
+    families = [family for family in STABILIZERS if plays(family, loops[main], alone_N_m[main])]
     for names, of in (([main], effort), (others, beside)):
         jobs = {
             (name, family.name): Job(
                 loops[name], family.name, alone_N_m[name], _starts(found.get((main, family.name))), of
             )
             for name in names
-            for family in STABILIZERS
-            if applies(family, loops[name])
+            for family in families
         }
         found |= _each(bench, jobs, kept, executor, stage, f"stabilizers on {' and '.join(names)}", _as_rows)
     return tuple(
@@ -138,6 +140,17 @@ def compare(
         )
         for name, loop in loops.items()
     )
+
+
+def plays(family: Family, loop: Scene, alone_N_m: float) -> bool:
+    """Tells whether a family can hold what compares with a wall without any element: force bounding may not."""
+    return family is not FORCE_BOUNDING or bounded_N_m(loop) > _SHOWS * alone_N_m
+
+
+def bounded_N_m(loop: Scene) -> float:
+    """Returns what force bounding holds of any stiffer wall that is pressed slowly, N/m: E' = f and f^2 = 4 b E / T
+    have f = (2 b / T) x, b the damping that the device declares."""
+    return 2.0 * loop.device.damping * loop.clock.control_rate
 
 
 def _starts(rows: tuple[Row, ...] | None) -> tuple[tuple[int, Values | None], ...]:
@@ -179,21 +192,6 @@ def _as_row(data: dict[str, Any]) -> Row:
         parameter=tuple(data["parameter"]),
         device=tuple(data["device"]),
     )
-
-
-def as_comparison(data: dict[str, Any]) -> Comparison:
-    """Returns the comparison that was written as JSON."""
-    loops = [
-        OfLoop(
-            each["name"],
-            each["delay_s"],
-            each["alone_N_m"],
-            *(_as_rows(each[of]) for of in ("rows", "again")),
-        )
-        for each in data["loops"]
-    ]
-    efforts = (Effort(**data[name]) for name in ("effort", "beside"))
-    return Comparison(data["name"], data["task"], tuple(data["notes"]), *efforts, tuple(loops))
 
 
 def _as_trying(data: Sequence[Any]) -> Trying:

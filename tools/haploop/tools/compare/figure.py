@@ -12,7 +12,7 @@ from haploop.tools.advise.families import NOTHING
 from haploop.tools.advise.report import format_stiffness
 from haploop.tools.compare.bench import Row, family_of
 from haploop.tools.compare.comparison import Comparison, OfLoop
-from haploop.tools.compare.ranking import best, held, more, ranking, shows_walls, without
+from haploop.tools.compare.ranking import best, held, more, ranking, without
 from haploop.tools.compare.report import SIGNS
 from haploop.tools.figure import style
 
@@ -58,7 +58,7 @@ def figure_of(comparisons: Sequence[Comparison]) -> Figure:
 
 def _rows(of: OfLoop) -> list[Row]:
     """Returns the rows that are drawn, from top to bottom."""
-    return [row for row in shows_walls(of.rows) if row.family != NOTHING.name]
+    return [row for row in of.rows if row.family != NOTHING.name]
 
 
 def _gains(ax: Axes, told: Comparison) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,16 +17,17 @@ from haploop.tools.advise.families import (
     Family,
 )
 from haploop.tools.advise.report import format_stiffness
-from haploop.tools.cli.options import WRONG_USE, leave
-from haploop.tools.compare.command import COMPARISON
-from haploop.tools.compare.comparison import Comparison, OfLoop, as_comparison
+from haploop.tools.advise.subject import make_subject
+from haploop.tools.cli.options import FAILED, WRONG_USE, leave
+from haploop.tools.cli.scenes import kinds_with
+from haploop.tools.compare.command import ROWS, find
+from haploop.tools.compare.comparison import Comparison, OfLoop
 from haploop.tools.compare.figure import figure_of
-from haploop.tools.compare.ranking import best, choice, held, ranking, shows_walls, without
+from haploop.tools.compare.ranking import best, choice, held, ranking, without
 from haploop.tools.compare.report import (
     READING,
     again_sentence,
     cells,
-    hidden_sentence,
     join,
     loops_rows,
     most_sentence,
@@ -38,6 +38,8 @@ from haploop.tools.figure.style import write_figure
 from haploop.tools.render.terminal import markdown_table
 
 PAGE, FIGURE = "comparison.md", "comparison.png"
+# Devices with their round trip.
+DEVICES = {"premium15_cable": None, "touch": "1 ms", "omega3": "1 ms"}
 _INTRO = """\
 Every stabilizer that comes with haploop, each tuned by the same search with the same effort on the same task, then
 tried under seeds that the search has not seen. Written by `make comparison`; `haploop compare DEVICE` does the same
@@ -155,7 +157,7 @@ def page(comparisons: Sequence[Comparison]) -> str:
     for told in comparisons:
         first, *others = told.loops
         parts += [f"## {told.name}, round trip {first.delay_s * 1e3:g} ms", " ".join(told.notes)]
-        parts += [most_sentence(first), again_sentence(first), hidden_sentence(first), _table(first)]
+        parts += [most_sentence(first), again_sentence(first), _table(first)]
         if others:
             rows = loops_rows(told.loops)
             parts += [_BESIDE.format(**vars(told.beside))]
@@ -165,23 +167,23 @@ def page(comparisons: Sequence[Comparison]) -> str:
 
 def _table(of: OfLoop) -> str:
     found, tied = best(of)
-    rows = [[cells(row, of)[name] for name in _HEADS] for row in shows_walls(of.rows)]
-    for row, words in zip(shows_walls(of.rows), rows, strict=True):
+    rows = [[cells(row, of)[name] for name in _HEADS] for row in of.rows]
+    for row, words in zip(of.rows, rows, strict=True):
         if row is found or row in tied:
             words[0] = f"**{words[0]}**"
     return markdown_table([*_HEADS.values()], rows, range(2, 4))
 
 
-def write(directory: Path, docs: Path) -> Path:
-    """Writes page and figure from the comparisons below a directory into ``docs``; returns the page's file.
+def write(rows: Path, docs: Path) -> Path:
+    """Compares on every device but what is kept in ``rows``, and writes page and figure; returns the page's file.
 
-    Raises FigureError without matplotlib, OSError or ValueError for a comparison that cannot be read.
+    Raises FigureError without matplotlib.
     """
-    files = sorted(directory.glob(f"*/{COMPARISON}"))
-    comparisons = [as_comparison(json.loads(file.read_text(encoding="utf-8"))) for file in files]
-    comparisons.sort(key=lambda told: told.loops[0].delay_s)
-    if not comparisons:
-        raise ValueError(f"{directory} has no {COMPARISON} in any directory below it; run haploop compare first.")
+    comparisons = list[Comparison]()
+    for device, delay in DEVICES.items():
+        (rows / device).mkdir(parents=True, exist_ok=True)
+        subject = make_subject(device, None, delay, None, [], kinds_with([]))
+        comparisons.append(find(subject, grid=True, workers=None, rows=rows / device / ROWS))
     write_figure(figure_of(comparisons), docs / FIGURE)
     (docs / PAGE).write_text(page(comparisons), encoding="utf-8")
     return docs / PAGE
@@ -190,5 +192,7 @@ def write(directory: Path, docs: Path) -> Path:
 if __name__ == "__main__":
     try:
         print(write(Path(sys.argv[1]), Path(sys.argv[2])))
-    except (OSError, ValueError, FigureError) as error:
+    except KeyboardInterrupt:
+        leave("Interrupted; the same command goes on.", FAILED)
+    except FigureError as error:
         leave(str(error), WRONG_USE)

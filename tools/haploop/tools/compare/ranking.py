@@ -11,9 +11,6 @@ from haploop.tools.compare.bench import Row
 from haploop.tools.compare.comparison import OfLoop
 from haploop.tools.search.intervals import Interval, mean_interval
 
-# What holds less than this share of what is held without any element hides every wall.
-_SHOWS = 0.1
-
 
 def held(row: Row) -> Interval:
     """Returns the stiffness that is rendered while the wall is held, with its interval over the seeds, N/m."""
@@ -30,12 +27,6 @@ def more(row: Row, than: Row) -> Interval:
 def without(rows: Sequence[Row]) -> Row:
     """Returns the row of no element."""
     return next(row for row in rows if row.family == NOTHING.name)
-
-
-def shows_walls(rows: Sequence[Row]) -> list[Row]:
-    """Returns the rows that are worth a ranking: those that hold a tenth of what is held without any element."""
-    least = _SHOWS * held(without(rows)).value
-    return [row for row in rows if held(row).value >= least]
 
 
 class Ranking(NamedTuple):
@@ -61,7 +52,7 @@ class Ranking(NamedTuple):
 def apart(rows: Sequence[Row]) -> frozenset[tuple[str, str]]:
     """Returns the pairs, the larger first, whose mean difference has an interval without 0."""
     pairs = set[tuple[str, str]]()
-    for some, other in combinations(shows_walls(rows), 2):
+    for some, other in combinations(rows, 2):
         inside = more(some, other)
         if inside.low > 0.0 or inside.high < 0.0:
             pairs.add((some.family, other.family) if inside.low > 0.0 else (other.family, some.family))
@@ -77,9 +68,8 @@ def ranking(of: OfLoop) -> Ranking:
 
 def best(of: OfLoop) -> tuple[Row, list[Row]]:
     """Returns the row that renders most, and those that cannot be told from it under both sets of seeds, as listed."""
-    rows, order = shows_walls(of.rows), ranking(of)
-    found = max(rows, key=lambda row: held(row).value)
-    return found, [row for row in rows if row is not found and order.versus(found.family, row.family) == "alike"]
+    found, order = max(of.rows, key=lambda row: held(row).value), ranking(of)
+    return found, [row for row in of.rows if row is not found and order.versus(found.family, row.family) == "alike"]
 
 
 def choice(of: OfLoop) -> Row:

@@ -14,7 +14,7 @@ from haploop.tools.advise.families import NOTHING
 from haploop.tools.advise.report import format_stiffness
 from haploop.tools.compare.bench import MOST_N_M, Row, family_of
 from haploop.tools.compare.comparison import Comparison, OfLoop
-from haploop.tools.compare.ranking import best, choice, held, more, ranking, shows_walls, without
+from haploop.tools.compare.ranking import best, choice, held, more, ranking, without
 from haploop.tools.render.terminal import make_facts, make_table
 from haploop.tools.render.units import amount, fixed
 from haploop.tools.search.intervals import mean_interval
@@ -33,7 +33,6 @@ SIGNS = {"more": " ▲", "less": " ▼", "alike": ""}
 _TIED = "{0} renders most, {1}; it cannot be told apart from {2}."
 _NO_GAIN = "No element can be told to hold more than none, {0}."
 _FIRST = "{0} renders most, {1}, and more than every other."
-_HIDES = "Left out: {0} hides every wall and holds {1}, whatever is rendered."
 _AGAIN = "{0} of {1} pairs that are apart are so under other seeds, tuning included; {2} are the other way round."
 
 
@@ -44,7 +43,7 @@ def report(told: Comparison) -> RenderableType:
         Text(f"All stabilizers on {told.name}, each tuned alike.", style="bold"),
         make_facts([("most", most_sentence(first)), ("again", again_sentence(first))], least_width=7),
         Text(),
-        *(Text(note, style="dim") for note in filter(None, [*told.notes, hidden_sentence(first)])),
+        *(Text(note, style="dim") for note in told.notes),
         _rendered(first),
         _costs(first),
         Text(task_sentence(told), style="dim"),
@@ -71,13 +70,6 @@ def most_sentence(of: OfLoop) -> str:
         return _NO_GAIN.format(format_stiffness(held(without(of.rows)).value))
     name, value = with_parameters(found), format_stiffness(held(found).value)
     return _TIED.format(name, value, join([row.family for row in tied])) if tied else _FIRST.format(name, value)
-
-
-def hidden_sentence(of: OfLoop) -> str:
-    """Says of elements that are in no table what they hold; nothing where there are none."""
-    shown = shows_walls(of.rows)
-    return " ".join(_HIDES.format(with_parameters(row), format_stiffness(held(row).value))
-                    for row in of.rows if row not in shown)  # fmt: skip
 
 
 def again_sentence(of: OfLoop) -> str:
@@ -136,7 +128,7 @@ def _shares(shares: Sequence[float]) -> str:
 def _table(of: OfLoop, heads: dict[str, str], numbers: Sequence[str], padding: int) -> Table:
     table = make_table(*heads.values(), numbers=[heads[name] for name in numbers], padding=(0, padding, 0, 0))
     found, tied = best(of)
-    for row in shows_walls(of.rows):
+    for row in of.rows:
         told = cells(row, of)
         table.add_row(*(told[name] for name in heads), style="bold" if row is found or row in tied else "")
     return table
@@ -166,12 +158,10 @@ def _breaks(row: Row) -> str:
 
 def loops_rows(loops: Sequence[OfLoop]) -> list[list[str]]:
     """Makes the rows of a table of what is held on every loop: without any element, and how much more with each."""
-    shown = [[row.family for row in shows_walls(of.rows)] for of in loops]
     rows = [[NOTHING.name, *(f"{held(without(of.rows)).value / 1e3:.2f}" for of in loops)]]
     for alike in zip(*(of.rows for of in loops), strict=True):
-        if alike[0].family != NOTHING.name and all(alike[0].family in some for some in shown):
-            cells = [gain(row, of) for row, of in zip(alike, loops, strict=True)]
-            rows.append([alike[0].family, *cells])
+        if alike[0].family != NOTHING.name:
+            rows.append([alike[0].family, *map(gain, alike, loops)])
     return rows
 
 
