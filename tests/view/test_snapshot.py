@@ -210,3 +210,27 @@ def test_an_event_is_told_in_words_with_its_units(event, text):
     }
     (line,) = event_lines([(1500, event)], 1000, options)
     assert (line["tick"], line["t_s"], line["text"]) == (1500, 1.5, text)
+
+
+def test_own_columns_of_elements_are_shown_in_their_units_while_their_elements_are_at_work():
+    """Two elements with three columns of two units; of the second swapped away, nothing where it was not."""
+    history, row = made_up(), np.arange(100.0)
+    units = {"dissipation.0.alpha": "N s/m", "dissipation.0.W": "J", "dissipation.1.W": "J"}
+    both = AtWork((element("observer"), element("other")), WALL)
+    columns = dict.fromkeys(("x", "v", "wall", "total", "dissipation.0", "dissipation.1"), row)
+    history.append_ticks(100, columns | {name: row + place for place, name in enumerate(units)}, both, units)
+    gone = {name: np.full(100, np.nan) for name in units}
+    history.append_ticks(200, columns | gone, AtWork((element("damping"),), WALL), units)
+    assert not [name for name in drawn(history, span_s=0.5)["tables"] if name.startswith("own")], "another panel"
+    tables = drawn(history, span_s=None, panel="own")["tables"]
+    assert [[c["label"] for c in tables[name]["columns"]] for name in ("own.0", "own.1")] == [
+        ["element 0: observer, alpha"],
+        ["element 0: observer, W", "element 1: other, W"],
+    ]
+    assert [tables[name]["columns"][0]["unit"] for name in ("own.0", "own.1")] == ["N s/m", "J"]
+    seen = tables["own.1"]["values"]["own.1.other.W"]
+    assert np.isnan(seen[:100]).all()
+    np.testing.assert_array_equal(seen[100:200], row + 2)
+    assert np.isnan(seen[200:]).all()
+    late = drawn(history, span_s=0.05, panel="own")["tables"]
+    assert not [name for name in late if name.startswith("own")]

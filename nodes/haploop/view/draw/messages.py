@@ -116,6 +116,7 @@ def state(session: RunSession) -> Message:
         "first_s": (history.first_tick or 0) / time.control_rate,
         "options": None if session.outcome else session.clock.options,
         "elements": [{"kind": one.name, "parameters": {**one.parameters, "acts": one.acts}} for one in elements],
+        "own": bool(history.own),
         "wall": wall
         and {
             "position": wall.position,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
@@ -21,6 +22,7 @@ _OF_PLANT = ("x", "v", "force", "actuator", "cable.stretch", "cable.rate", "grip
 _OF_CONTROLLER = ("x", "v", "wall", "total")
 _LOGGED_POSITIONS = ("x", "tip_x", "hand_x")
 _STATE_BYTES = 8
+_OWN = re.compile(r"dissipation\.\d+\.")
 # Columns of the energy that no page shows.
 _NOT_SHOWN, _SAMPLED = ("timestamp", "moved"), ".sampled"
 
@@ -84,8 +86,14 @@ def _plant(history: History, run: list[Block]) -> None:
 
 
 def _controller(history: History, run: list[Block]) -> None:
-    names = [*_OF_CONTROLLER, *(f"dissipation.{place}" for place in range(len(run[0]["elements"])))]
-    history.append_ticks(run[0]["from_tick"], _joined(run, names), AtWork.of_block(run[0]))
+    elements = run[0]["elements"]
+    units = {
+        f"dissipation.{place}.{name}": unit
+        for place, element in enumerate(elements)
+        for name, unit in element.get("columns", {}).items()
+    }
+    names = [*_OF_CONTROLLER, *(f"dissipation.{place}" for place in range(len(elements))), *units]
+    history.append_ticks(run[0]["from_tick"], _joined(run, names), AtWork.of_block(run[0]), units)
 
 
 def _energy(history: History, run: list[Block]) -> None:
@@ -123,9 +131,10 @@ class Backfill:
         if batch.topic == "/energy":
             self.history.append_energy(tick, {name: rows[name] for name in filter(_is_shown, rows)})
             return
+        own = {name: unit for name, unit in rows.units.items() if _OWN.match(name)}
         for first, end, scene in self._spans(tick, tick + len(rows["timestamp"])):
             columns = {name: column[first - tick : end - tick] for name, column in rows.items()}
-            self.history.append_ticks(first, columns, AtWork(scene.dissipation, scene.wall))
+            self.history.append_ticks(first, columns, AtWork(scene.dissipation, scene.wall), own)
 
     def _plant(self, rows: Table) -> None:
         """Takes the steps of whole ticks, after which the end state of the run may follow."""

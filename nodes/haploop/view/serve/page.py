@@ -16,7 +16,8 @@ from aiohttp import WSCloseCode, WSMsgType, web
 
 from haploop.protocol.transport.wire import Message
 from haploop.view.draw.messages import WAITING, event_lines, state
-from haploop.view.draw.snapshot import PANELS, Viewport, snapshot
+from haploop.view.draw.panels import PANELS
+from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.receive.runs import CommandFailed
 from haploop.view.serve.guard import Guard
 from haploop.view.viewer import Viewer
@@ -182,7 +183,7 @@ def _watch(message: Message) -> Viewport:
         raise BadMessage("watch.span_s must be above 0, or null.")
     if isinstance(points, bool) or not isinstance(points, int | float) or not math.isfinite(points):
         raise BadMessage("watch.points must be a number.")
-    panel = message.get("panel", PANELS[0])
+    panel = message.get("panel", Viewport.panel)
     if panel not in PANELS:
         raise BadMessage(f"watch.panel must be one of {', '.join(PANELS)}.")
     return Viewport(

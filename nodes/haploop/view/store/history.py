@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,7 @@ Columns = Mapping[str, np.ndarray]
 _RECENT_TICKS, _RECENT_STEPS, _LEAST_TICKS = 16_384, 131_072, 512
 # Books of elements that are kept, the newest: every change of a parameter opens one.
 _MOST_BOOKS = 16
+_NO_UNITS: Mapping[str, str] = MappingProxyType({})
 TRUE, WALL_BOOK, EARLIER = ".true", "wall.true", "earlier.true"
 
 
@@ -52,8 +54,9 @@ class History:
     Attributes:
         steps: at plant steps: x, tip_x and hand_x where there are such bodies, and the force on the device.
         ticks: at control ticks: x_measured, v, forces of the wall and of each element (``element.<place>.<kind>``),
-            their total, the wall's position and stiffness (NaN without one), and the mass of each virtual inertia while
-            it is at work, else 0 (``mass.<place>.<kind>``).
+            their total, the wall's position and stiffness (NaN without one), the mass of each virtual inertia while
+            it is at work, else 0 (``mass.<place>.<kind>``), and columns of their own (``own.<place>.<kind>.<name>``).
+        own: unit and label of each of these columns of elements, by name.
         energy: at ticks: the true book of the wall and of each element (``<name>.true``; ``earlier.true`` is the sum of
             those that are not kept apart), the plant's books, those that part the wall's by cause, and the residual.
         at_work: at the newest ticks of the controller.
@@ -69,6 +72,7 @@ class History:
         self.energy = LodSeries(1, _RECENT_TICKS, origin)
         self.all_series = self.steps, self.ticks, self.energy
         self.at_work = AtWork()
+        self.own: dict[str, tuple[str, str]] = {}
         self.stop_tick: int | None = None
         self.version = 0
         self._end_state: dict[str, np.ndarray] = {}
@@ -108,10 +112,10 @@ class History:
             beyond = np.full(self.time.steps_per_tick - 1, np.nan)
             self.append_steps(tick, {name: np.concatenate([value, beyond]) for name, value in state.items()})
 
-    def append_ticks(self, tick: int, columns: Columns, at_work: AtWork) -> None:
+    def append_ticks(self, tick: int, columns: Columns, at_work: AtWork, units: Mapping[str, str] = _NO_UNITS) -> None:
         """Appends rows of the controller, x, v, wall, total and ``dissipation.<place>``, during which this was at work.
 
-        An element without a column has not come yet.
+        An element without a column has not come yet. ``units`` has the units of ``dissipation.<place>.<name>``.
         """
         self.at_work, wall = at_work, at_work.wall
         kept = {"x_measured": columns["x"], "v": columns["v"], "wall": columns["wall"], "total": columns["total"]}
@@ -124,6 +128,11 @@ class History:
             kept[f"element.{place}.{element.name}"] = force
             if "inertia" in element.name and "mass" in element.parameters:
                 kept[f"mass.{place}.{element.name}"] = np.where(force != 0.0, element.parameters["mass"], 0.0)
+            own = f"dissipation.{place}."
+            for column in (one for one in units if one.startswith(own) and np.isfinite(columns[one]).any()):
+                name = column.removeprefix(own)
+                kept[known := f"own.{place}.{element.name}.{name}"] = columns[column]
+                self.own[known] = units[column], f"element {place}: {element.name}, {name}"
         self._append(self.ticks, tick, kept)
 
     def append_energy(self, tick: int, columns: Columns) -> None:
@@ -140,7 +149,7 @@ class History:
         for own, its in zip(self.all_series, other.all_series, strict=True):
             own.extend_from(its)
         if other.ticks.first_tick is not None:
-            self.at_work = other.at_work
+            self.at_work, self.own = other.at_work, self.own | other.own
         self._end_state = other._end_state
         self.stop_tick = other.stop_tick if self.stop_tick is None else self.stop_tick
         self.version += other.version + 1

@@ -3,7 +3,7 @@
 import { amount, isNumber } from "./amounts.js";
 import { byId } from "./dom.js";
 import { Panels } from "./panels.js";
-import { linesFor } from "./palette.js";
+import { linesOf } from "./palette.js";
 import { times } from "./snapshot.js";
 import { TimeChart } from "./time_chart.js";
 
@@ -45,7 +45,7 @@ export class Charts {
         overlay: tables[`overlay_${name}`] ?? null,
       });
     }
-    this.panels.show(snapshot, state);
+    this.panels.show(snapshot, state, marks);
   }
 
   /** Fit all axes closely the next time: another stretch of time is looked at. */
@@ -53,13 +53,6 @@ export class Charts {
     for (const { range } of Object.values(this.charts)) range.forget();
     this.panels.refit();
   }
-}
-
-/** Every column as a line; the residual is a number beside the chart, too small for a line. */
-function linesOf({ columns }) {
-  const drawn = columns.filter(({ name }) => name !== "residual");
-  const looks = linesFor(drawn);
-  return drawn.map(({ name, label, values }, i) => ({ key: name, label, line: looks[i], values }));
 }
 
 /** The wall's face and the side its material is on. */

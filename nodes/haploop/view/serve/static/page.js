@@ -80,6 +80,7 @@ function showState() {
   showHeader(state, phase());
   showNodes(state.nodes ?? []);
   showSummary(state);
+  charts.panels.offer(state);
   time.update(state);
   const goesOn = Boolean(state.options) && !state.summary;
   byId("swap").hidden = byId("set").hidden = !goesOn;

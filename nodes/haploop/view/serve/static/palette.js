@@ -36,8 +36,15 @@ export function linesFor(columns) {
   return columns.map(({ name, label }) => LINES[name] ?? elementLine(kindOf(label), seen));
 }
 
-/** "element 0: damping" and the book "damping-2" are both of the kind "damping". */
-const kindOf = (label) => label.replace(/^element \d+: /, "").replace(/-\d+$/, "");
+/** Every column as a line; the residual is a number beside the chart, too small for a line. */
+export function linesOf({ columns }) {
+  const drawn = columns.filter(({ name }) => name !== "residual");
+  const looks = linesFor(drawn);
+  return drawn.map(({ name, label, values }, i) => ({ key: name, label, line: looks[i], values }));
+}
+
+/** "element 0: damping", its own column "element 0: damping, alpha" and the book "damping-2" are of the kind "damping". */
+const kindOf = (label) => label.replace(/^element \d+: /, "").replace(/, .*$/, "").replace(/-\d+$/, "");
 
 function elementLine(kind, seen) {
   const number = placeOf(kind);

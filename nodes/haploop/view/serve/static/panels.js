@@ -1,9 +1,10 @@
-// The panels beside the charts over time, one of them shown: loops, energy by cause, spectrum, before and after, motion.
+// The panels beside the charts over time, one of them shown: loops, energy by cause, spectrum, before and after, motion, own columns.
 
 import { BudgetPanel } from "./budget_panel.js";
 import { ComparePanel } from "./compare_panel.js";
 import { byId } from "./dom.js";
 import { MotionPanel } from "./motion_panel.js";
+import { OwnPanel } from "./own_panel.js";
 import { PhasePlots } from "./phase_plots.js";
 import { SpectrumChart } from "./spectrum_chart.js";
 
@@ -19,6 +20,7 @@ export class Panels {
       spectrum: new SpectrumChart(byId("spectrum")),
       compare: new ComparePanel(byId("compare")),
       motion: new MotionPanel(byId("motion")),
+      own: new OwnPanel(byId("own"), viewport),
     };
     this.tabs = [...document.querySelectorAll("[role=tab]")];
     for (const tab of this.tabs) tab.addEventListener("click", () => this.choose(tab.dataset.panel));
@@ -26,8 +28,8 @@ export class Panels {
       const by = NEXT[event.key];
       if (!by) return;
       event.preventDefault();
-      const at = this.tabs.indexOf(document.activeElement);
-      const next = this.tabs[(at + by + this.tabs.length) % this.tabs.length];
+      const tabs = this.tabs.filter((tab) => !tab.hidden);
+      const next = tabs[(tabs.indexOf(document.activeElement) + by + tabs.length) % tabs.length];
       next.focus();
       this.choose(next.dataset.panel);
     });
@@ -44,14 +46,22 @@ export class Panels {
     this.viewport.choose(name);
   }
 
+  /** Offer what this run has: own columns where an element shows some. */
+  offer({ own }) {
+    const tab = this.tabs.find(({ dataset }) => dataset.panel === "own");
+    tab.hidden = !own;
+    if (!own && this.viewport.panel === "own") this.choose("loops");
+  }
+
   /** Show what a snapshot has for the chosen panel. */
-  show(snapshot, state) {
-    this.panels[this.viewport.panel].show(snapshot, state);
+  show(snapshot, state, marks) {
+    this.panels[this.viewport.panel].show(snapshot, state, marks);
   }
 
   /** Fit all axes closely the next time. */
   refit() {
     this.panels.loops.refit();
     this.panels.spectrum.refit();
+    this.panels.own.refit();
   }
 }

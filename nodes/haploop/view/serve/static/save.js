@@ -42,7 +42,7 @@ const wordsOf = (chart) => (chart.querySelector(".head, .line-name, figcaption")
 /** Save what is drawn as lines of table, place (s, or Hz of a spectrum), quantity, unit, value in SI. */
 export function saveData({ tables }, { run }) {
   const lines = ["table,place,quantity,unit,value"];
-  for (const name of TABLES.filter((one) => tables[one])) {
+  for (const name of Object.keys(tables).filter((one) => TABLES.includes(one) || one.startsWith("own."))) {
     const { t0_s: t0, dt_s: dt, columns } = tables[name];
     for (const { name: quantity, unit, values } of columns) {
       values.forEach((value, i) => lines.push(`${name},${Number((t0 + i * dt).toPrecision(10))},${quantity},${unit},${value}`));

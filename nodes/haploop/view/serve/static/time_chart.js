@@ -42,6 +42,11 @@ export class TimeChart {
     new ResizeObserver(() => this.resize()).observe(this.plot);
   }
 
+  remove() {
+    this.u.destroy();
+    this.host.remove();
+  }
+
   build() {
     this.u?.destroy();
     const { label, times } = this.options;
@@ -65,7 +70,7 @@ export class TimeChart {
         y: { auto: false, range: () => this.range.now },
       },
       series: [{}, ...series],
-      axes: [times ? bottomAxis("simulated time (s)") : bareAxis(), leftAxis(`${label} (${this.unit.name})`)],
+      axes: [times ? bottomAxis("simulated time (s)") : bareAxis(), leftAxis(named(label, this.unit.name))],
       cursor: {
         y: false,
         points: { show: false },
@@ -193,3 +198,6 @@ export class TimeChart {
     if (size.width !== this.u.width || size.height !== this.u.height) this.u.setSize(size);
   }
 }
+
+/** What stands along an axis: a quantity with its unit, or the one that there is. */
+const named = (label, unit) => (label && unit ? `${label} (${unit})` : label || unit || "pure number");

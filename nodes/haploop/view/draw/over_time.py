@@ -1,0 +1,151 @@
+"""Tables over time: position, force, energy and own columns of elements, fit for a number of points side by side."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+
+from haploop.view.draw.messages import Column, Table
+from haploop.view.store.history import TRUE, WALL_BOOK, History
+from haploop.view.store.lod_series import LodSeries
+
+# Rows per point of the page at most; beyond, the rows are summed up in so many buckets per point.
+_ROWS_A_POINT, _BUCKETS_A_POINT = 3.5, 0.75
+# Parts of an overview of the run; units of own columns that are shown, the first.
+_OVERVIEW_PARTS, _MOST_UNITS = 256, 3
+_BODIES = {"x": "position", "tip_x": "position of the tip", "hand_x": "position of the hand"}
+_MEASURED = {"wall_position": Column("wall", "m", "wall"), "x_measured": Column("x_measured", "m", "measured position")}
+_MAKING = re.compile(r"-\d+$")
+# Columns of one series by name, each with its header entry.
+Part = tuple[LodSeries, Mapping[str, Column]]
+# Whether a column is worth showing, from its values in the interval.
+IsShown = Callable[[Column, np.ndarray], bool]
+
+
+def is_there(_: Column, values: np.ndarray) -> bool:
+    return bool(np.isfinite(values).any())
+
+
+class Interval:
+    """Makes tables over time of the ticks from ``first`` to before ``end``, fit for a number of points."""
+
+    def __init__(self, first: int, end: int, rate: int, points: int) -> None:
+        self._first, self._end, self._rate, self._points = first, end, rate, points
+
+    def table(self, name: str, parts: list[Part], is_shown: IsShown = lambda *_: True) -> Table | None:
+        """Returns a table of columns of some series, the first of which has the most rows a tick; None for none."""
+        if not parts[0][1]:
+            return None
+        all_series, most = [series for series, _ in parts], parts[0][0].rows_per_tick
+        in_full = all(series.full_from_tick <= self._first for series in all_series)
+        if in_full and (self._end - self._first) * most <= _ROWS_A_POINT * self._points:
+            first, step = float(self._first), 1.0 / most
+            values = [
+                series.rows(list(columns), self._first, self._end).repeat(most // series.rows_per_tick, axis=1)
+                for series, columns in parts
+            ]
+        else:
+            in_full, bucket = False, self._bucket(all_series)
+            begins = all_series[0].aligned(self._first, bucket)
+            ends = self._end + (begins - self._end) % bucket
+            values = [series.envelope(list(columns), begins, ends, bucket) for series, columns in parts]
+            first, step = begins + bucket / 4.0, bucket / 2.0
+        rows, columns = np.concatenate(values), [known for _, columns in parts for known in columns.values()]
+        shown = [i for i, known in enumerate(columns) if is_shown(known, rows[i])]
+        if not shown:
+            return None
+        columns = [columns[i] for i in shown]
+        return Table(name, first / self._rate, step / self._rate, columns, rows[shown], envelope=not in_full)
+
+    def _bucket(self, all_series: list[LodSeries]) -> int:
+        """Returns the ticks of a bucket: the least power of two that leaves no more buckets than there is room for."""
+        room = _BUCKETS_A_POINT * self._points
+        bucket = 1 << max(0, math.ceil(math.log2((self._end - self._first) / room)))
+        for series in all_series * 2:  # what is coarse enough for one may begin too early for another
+            bucket = series.bucket_from(self._first, bucket)
+        return bucket
+
+
+def _position(history: History) -> tuple[str, list[Part], IsShown]:
+    moving = {name: Column(name, "m", label) for name, label in _BODIES.items() if name in history.steps.names}
+    return "position", [(history.steps, moving), (history.ticks, _MEASURED)], lambda *_: True
+
+
+def _force(history: History) -> tuple[str, list[Part], IsShown]:
+    """Lists wall, elements by place and total, each shown where it has values in the interval."""
+    columns = {"wall": Column("wall", "N", "wall")} if history.at_work.wall else {}
+    for name, place, kind in sorted(by_place(history, "element"), key=lambda element: int(element[1])):
+        columns[name] = Column(name, "N", f"element {place}: {kind}")
+    columns["total"] = Column("total", "N", "total")
+    return "force", [(history.ticks, columns)], is_there
+
+
+def by_place(history: History, what: str) -> Iterator[tuple[str, str, str]]:
+    """Yields name, place and kind of the columns ``<what>.<place>.<kind>``."""
+    for name in history.ticks.names:
+        if name.startswith(f"{what}."):
+            _, place, kind = name.split(".", 2)
+            yield name, place, kind
+
+
+def _energy(history: History) -> tuple[str, list[Part], IsShown]:
+    """Lists the books of the wall, of the elements at work, and of those whose energy changes in the interval."""
+    columns = {WALL_BOOK: Column("wall", "J", "wall")} if history.at_work.wall else {}
+    books = [name.removesuffix(TRUE) for name in history.energy.names if name.endswith(TRUE) and name != WALL_BOOK]
+    columns |= {f"{name}{TRUE}": Column(name, "J", name) for name in books}
+    columns["residual"] = Column("residual", "J", "residual")
+    always = {"wall", "residual", *_books_at_work(history, books)}
+
+    def is_shown(known: Column, values: np.ndarray) -> bool:
+        finite = values[np.isfinite(values)]
+        return bool(len(finite)) and (known.name in always or bool(finite.min() < finite.max()))
+
+    return "energy", [(history.energy, columns)], is_shown
+
+
+def _books_at_work(history: History, books: list[str]) -> list[str]:
+    """Returns the newest books of each kind, as many as elements of the kind are at work; the others are closed."""
+    found: list[str] = []
+    for element in history.at_work.elements:
+        found += [name for name in books if name not in found and _MAKING.sub("", name) == element.name][-1:]
+    return found
+
+
+def own_columns(history: History) -> list[Part]:
+    """Returns what elements show beside their forces, a part for each of the first units."""
+    units = dict.fromkeys(unit for unit, _ in history.own.values())
+    return [
+        (history.ticks, {name: Column(name, unit, label) for name, (its, label) in history.own.items() if its == unit})
+        for unit in list(units)[:_MOST_UNITS]
+    ]
+
+
+def over_time(history: History, interval: Interval) -> list[Table | None]:
+    """Returns position, force and energy."""
+    return [interval.table(*made(history)) for made in (_position, _force, _energy)]
+
+
+def overview(history: History) -> Table:
+    """Returns the position over the whole run, the two extremes of each of its parts."""
+    first, end, rate = history.first_tick or 0, history.end_tick, history.time.control_rate
+    bucket = 1 << max(0, math.ceil(math.log2(max(1, end - first) / _OVERVIEW_PARTS)))
+    bucket = history.steps.bucket_from(first, bucket)
+    begins = history.steps.aligned(first, bucket)
+    values = history.steps.envelope(["x"], begins, end + (begins - end) % bucket, bucket)
+    columns = [Column("x", "m", "position")]
+    return Table("overview", (begins + bucket / 4.0) / rate, bucket / 2.0 / rate, columns, values, envelope=True)
+
+
+def laid_over(history: History, from_s: float, to_s: float, points: int) -> list[Table | None]:
+    """Returns position and total force of another run in the same interval of its own simulated time."""
+    rate = history.time.control_rate
+    first, end = max(history.first_tick or 0, math.floor(from_s * rate)), min(history.end_tick, math.ceil(to_s * rate))
+    if first >= end:
+        return []
+    interval = Interval(first, end, rate, points)
+    x, total = {"x": Column("x", "m", "position")}, {"total": Column("total", "N", "total")}
+    parts: list[tuple[str, Part]] = [("position", (history.steps, x)), ("force", (history.ticks, total))]
+    return [interval.table(f"overlay_{name}", [part]) for name, part in parts]
