@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.protocol.walls.registry import make_wall, wall_names
+from haploop.protocol.walls.registry import make_wall
+from haploop.protocol.walls.wall import Spring
 from haploop.view.draw.messages import Column, Table
 from haploop.view.draw.over_time import Interval, by_place, is_there, own_columns
 from haploop.view.look.budget import budget
@@ -101,9 +103,10 @@ def _force_position(history: History, first: int, end: int) -> Table | None:
     columns = [Column("penetration", "m", "penetration"), Column("force", "N", "force out of the wall")]
     known = stiffness[np.isfinite(stiffness)]
     more: dict[str, Any] = {"stiffness": float(known[-1]) if len(known) else None}
-    if (wall := history.at_work.wall) and wall.kind in wall_names()[1:]:
-        curve = np.linspace(0.0, max(float(depth.max()), 0.0), _CURVE)
-        more["curve"] = [curve.tolist(), make_wall(wall).held(curve).tolist()]
+    with suppress(KeyError):  # the wall of a package that is not installed
+        if not isinstance(wall := make_wall(history.at_work.wall), Spring):
+            curve = np.linspace(0.0, max(float(depth.max()), 0.0), _CURVE)
+            more["curve"] = [curve.tolist(), wall.held(curve).tolist()]
     return Table("loop", first / time.control_rate, each / time.plant_rate, columns, values, more=more)
 
 

@@ -41,7 +41,6 @@ export class Charts {
         wall: name === "position" ? wallOf(lines, state) : null,
         marks,
         note: name === "energy" ? residual(state) : "",
-        envelope: tables[name]?.envelope ?? false,
         overlay: tables[`overlay_${name}`] ?? null,
       });
     }

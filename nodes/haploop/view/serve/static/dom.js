@@ -21,3 +21,34 @@ export function sign(element, shape, word) {
   element.querySelector("use").setAttribute("href", `#${shape}`);
   put(element.querySelector("span"), word);
 }
+
+/** What texts need to be read: `act`, at most once in so many ms, the last time with the last arguments. */
+export function seldom(act, gap_ms = 120) {
+  let [due, timer, last] = [0, 0, []];
+  const run = () => {
+    [due, timer] = [performance.now() + gap_ms, 0];
+    act(...last);
+  };
+  return (...now) => {
+    last = now;
+    if (timer) return;
+    const wait_ms = due - performance.now();
+    if (wait_ms > 0) timer = setTimeout(run, wait_ms);
+    else run();
+  };
+}
+
+/** Tells `turned` whether an element can be seen, whenever that changes: what cannot be seen need not be drawn. */
+export function onSight(element, turned) {
+  new IntersectionObserver((entries) => turned(entries.at(-1).isIntersecting), { rootMargin: "200px" }).observe(element);
+}
+
+/** Keeps the pixels of a canvas those of its box; `again` after they have changed. No frame asks for the layout. */
+export function fitCanvas(canvas, height_px, again) {
+  new ResizeObserver(([{ contentRect }]) => {
+    const [width, height] = [contentRect.width, height_px].map((px) => Math.round(px * devicePixelRatio));
+    if (!width || (canvas.width === width && canvas.height === height)) return;
+    Object.assign(canvas, { width, height });
+    again();
+  }).observe(canvas);
+}

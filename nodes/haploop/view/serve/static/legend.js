@@ -62,5 +62,5 @@ export class Legend {
   }
 }
 
-/** For uPlot, which asks for a colour at every drawing; `percent` of it where it is to be faint. */
-export const stroke = (line, percent = 100) => () => percent < 100 ? `color-mix(in srgb, ${colour(line.colour)} ${percent}%, transparent)` : colour(line.colour);
+/** For uPlot, which asks for a colour at every drawing. */
+export const stroke = (line) => () => colour(line.colour);

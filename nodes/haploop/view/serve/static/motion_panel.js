@@ -2,7 +2,7 @@
 
 import { amount } from "./amounts.js";
 import { FONT } from "./axes.js";
-import { make, put } from "./dom.js";
+import { fitCanvas, make, put, seldom } from "./dom.js";
 import { colour } from "./palette.js";
 import { extent, Range } from "./range.js";
 import { last } from "./snapshot.js";
@@ -18,15 +18,19 @@ export class MotionPanel {
     this.note = make("p", { class: "about" });
     this.range = new Range(1e-4);
     host.append(make("h2", {}, "In motion"), this.canvas, this.note);
+    this.tell = seldom((words) => put(this.note, words));
+    fitCanvas(this.canvas, HEIGHT, () => this.last && this.show(...this.last));
   }
 
-  show({ tables: { position, force } }, { wall }) {
+  show(snapshot, state) {
+    this.last = [snapshot, state];
+    const { tables: { position, force } } = snapshot;
+    const { wall } = state;
     const ratio = devicePixelRatio;
-    const width = Math.round(this.canvas.clientWidth * ratio);
-    if (this.canvas.width !== width || this.canvas.height !== HEIGHT * ratio) Object.assign(this.canvas, { width, height: HEIGHT * ratio });
+    const { width } = this.canvas;
     const ctx = this.canvas.getContext("2d");
     ctx.clearRect(0, 0, width, this.canvas.height);
-    if (!position) return put(this.note, "Nothing moves yet.");
+    if (!position) return this.tell("Nothing moves yet.");
     const bodies = Object.keys(BODIES).flatMap((name) => {
       const column = position.columns.find((one) => one.name === name);
       return column ? [{ name, values: column.values, at: last(column.values) }] : [];
@@ -41,8 +45,7 @@ export class MotionPanel {
     const total = force?.columns.find(({ name }) => name === "total");
     const depth = (bodies[0].at - face) * (wall?.into_wall ?? 0);
     const where = depth > 0 ? `${amount(depth, "m")} inside the wall` : "outside the wall";
-    put(this.note, `${Number.isFinite(face) ? where : "no wall"}; ${amount(high - low, "m")} across${total ? `; force ${amount(last(total.values), "N")}` : ""}`);
-    return undefined;
+    return this.tell(`${Number.isFinite(face) ? where : "no wall"}; ${amount(high - low, "m")} across${total ? `; force ${amount(last(total.values), "N")}` : ""}`);
   }
 
   wall(ctx, x, side, width) {

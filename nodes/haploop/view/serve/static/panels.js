@@ -2,7 +2,7 @@
 
 import { BudgetPanel } from "./budget_panel.js";
 import { ComparePanel } from "./compare_panel.js";
-import { byId } from "./dom.js";
+import { byId, seldom } from "./dom.js";
 import { MotionPanel } from "./motion_panel.js";
 import { OwnPanel } from "./own_panel.js";
 import { PhasePlots } from "./phase_plots.js";
@@ -22,6 +22,8 @@ export class Panels {
       motion: new MotionPanel(byId("motion")),
       own: new OwnPanel(byId("own"), viewport),
     };
+    // Bars and tables are read, not watched.
+    for (const panel of [this.panels.energy, this.panels.compare]) panel.show = seldom(panel.show.bind(panel));
     this.tabs = [...document.querySelectorAll("[role=tab]")];
     for (const tab of this.tabs) tab.addEventListener("click", () => this.choose(tab.dataset.panel));
     byId("tabs").addEventListener("keydown", (event) => {

@@ -1,7 +1,7 @@
 // A loop: one quantity against another, as in Figs. 3 and 4 of Choi et al. 2022.
 
 import { bottomAxis, leftAxis } from "./axes.js";
-import { make, put } from "./dom.js";
+import { make, onSight, put } from "./dom.js";
 import { Legend, stroke } from "./legend.js";
 import { extent, Range } from "./range.js";
 
@@ -21,7 +21,12 @@ export class PhaseChart {
     this.absent = host.appendChild(make("p", { class: "absent" }, "Nothing yet."));
     this.parts = [];
     this.plot.hidden = true;
+    this.isSeen = true;
     this.build();
+    onSight(host, (isSeen) => {
+      this.isSeen = isSeen;
+      this.draw();
+    });
     new ResizeObserver(() => this.resize()).observe(this.plot);
   }
 
@@ -73,14 +78,19 @@ export class PhaseChart {
     put(this.absent, absent);
     this.plot.hidden = absent !== "";
     const [x, y] = ["x", "y"].map((side) => extent(parts.map((part) => part[side]), parts.length ? [0] : []));
-    const limits = [this.ranges[0].follow(...x), this.ranges[1].follow(...y)];
+    this.ranges[0].follow(...x);
+    this.ranges[1].follow(...y);
     if (isNew) {
       this.legend.name(parts.filter(({ label }) => label));
       this.build();
     }
+    this.draw();
+  }
+
+  draw() {
+    if (!this.isSeen) return;
     this.u.setData(this.data(), false);
-    this.u.setScale("y", { min: limits[1][0], max: limits[1][1] });
-    this.u.setScale("x", { min: limits[0][0], max: limits[0][1] });
+    ["x", "y"].forEach((side, i) => this.u.setScale(side, { min: this.ranges[i].now[0], max: this.ranges[i].now[1] }));
   }
 
   size() {

@@ -1,6 +1,6 @@
 // The whole run as a strip: its position, what changed it, and which part the charts show; dragging shows another.
 
-import { byId, put } from "./dom.js";
+import { byId, fitCanvas, put, seldom } from "./dom.js";
 import { colour } from "./palette.js";
 import { extent } from "./range.js";
 
@@ -15,6 +15,8 @@ export class Scrubber {
     this.input = byId("scrub");
     Object.assign(this.input, { min: "0", max: String(STEPS), step: "1" });
     this.input.addEventListener("input", () => this.move(Number(this.input.value) / STEPS));
+    this.show = seldom((...what) => this.draw(...what));
+    fitCanvas(this.canvas, HEIGHT, () => this.last && this.draw(...this.last));
   }
 
   /** Show the part that ends at this share of the run; at its end, what comes. */
@@ -26,11 +28,11 @@ export class Scrubber {
     else this.viewport.at(end - span, end);
   }
 
-  show({ from_s: from, to_s: to, tables: { overview } }, marks) {
+  draw(snapshot, marks) {
+    this.last = [snapshot, marks];
+    const { from_s: from, to_s: to, tables: { overview } } = snapshot;
     const ratio = devicePixelRatio;
-    const width = Math.round(this.canvas.clientWidth * ratio);
-    const height = HEIGHT * ratio;
-    if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
+    const { width, height } = this.canvas;
     const ctx = this.canvas.getContext("2d");
     ctx.clearRect(0, 0, width, height);
     const { first_s: first, last_s: last } = this.viewport;

@@ -2,7 +2,7 @@
 
 import { amount, axisNumbers } from "./amounts.js";
 import { bottomAxis, leftAxis } from "./axes.js";
-import { make, put } from "./dom.js";
+import { make, put, seldom } from "./dom.js";
 import { colour } from "./palette.js";
 import { line as linePath } from "./paths.js";
 import { Range, extent } from "./range.js";
@@ -24,6 +24,7 @@ export class SpectrumChart {
       return this.chart(name, side, plot, said);
     });
     host.append(this.note);
+    this.tell = seldom((lines) => this.words(lines));
   }
 
   chart(name, side, plot, said) {
@@ -53,7 +54,7 @@ export class SpectrumChart {
   }
 
   show({ tables: { spectrum }, lines }) {
-    for (const { name, side, u, range, said } of this.charts) {
+    for (const { name, side, u, range } of this.charts) {
       const column = spectrum?.columns.find((one) => one.name === name);
       const at = spectrum ? times(spectrum) : new Float64Array(0);
       const heights = column ? scaled(column.values, side.factor) : new Float64Array(0);
@@ -61,8 +62,12 @@ export class SpectrumChart {
       u.setData([at, heights], false);
       u.setScale("y", { min: range.now[0], max: range.now[1] });
       if (at.length) u.setScale("x", { min: at[0], max: at.at(-1) });
-      put(said, `${side.label}: ${named(lines?.[name], side.unit)}`);
     }
+    this.tell(lines);
+  }
+
+  words(lines) {
+    for (const { name, side, said } of this.charts) put(said, `${side.label}: ${named(lines?.[name], side.unit)}`);
     put(this.note, lines?.to_s ? `Amplitudes, ${lines.from_s.toFixed(2)} to ${lines.to_s.toFixed(2)} s.` : "Too few samples for a spectrum.");
   }
 

@@ -2,19 +2,18 @@
 
 import { amount, steady } from "./amounts.js";
 import { bareAxis, bottomAxis, leftAxis } from "./axes.js";
-import { make } from "./dom.js";
+import { make, onSight, seldom } from "./dom.js";
 import { Legend, stroke } from "./legend.js";
 import { drawMarks, drawMeasured } from "./marks.js";
 import { ClimbingUnit } from "./climbing.js";
 import { colour } from "./palette.js";
-import { band, halfPlane, line as linePath } from "./paths.js";
+import { drawStrips, halfPlane, line as linePath, strips } from "./paths.js";
 import { last, scaled, times } from "./snapshot.js";
 import { extent, Range } from "./range.js";
 
 const CURSORS = "haploop";
 const DECIMALS = 3;
-// A band is filled so faintly that those behind it are seen.
-const BAND = 45;
+const OVERLAY = { colour: "mark", width: 1 };
 
 export class TimeChart {
   /**
@@ -30,7 +29,7 @@ export class TimeChart {
     this.legend = new Legend(host, () => this.retoggle());
     this.plot = host.appendChild(make("div", { class: "plot" }));
     this.lines = [];
-    this.envelope = false;
+    this.rough = [];
     this.overlay = null;
     this.columns = [];
     this.t = new Float64Array(0);
@@ -38,7 +37,13 @@ export class TimeChart {
     this.marks = [];
     this.wall = null;
     this.note = "";
+    this.isSeen = true;
+    this.tellSeldom = seldom(() => this.tell());
     this.build();
+    onSight(host, (isSeen) => {
+      this.isSeen = isSeen;
+      this.draw();
+    });
     new ResizeObserver(() => this.resize()).observe(this.plot);
   }
 
@@ -54,12 +59,14 @@ export class TimeChart {
       label: name,
       stroke: stroke(line),
       width: line.width,
-      dash: this.envelope ? [] : line.dash,
-      fill: this.envelope ? stroke(line, BAND) : undefined,
+      dash: line.dash,
       show: this.legend.isShown(key),
       auto: false,
       points: { show: false },
-      paths: (u, i) => (this.envelope ? band(u, u.data[0], u.data[i]) : { stroke: linePath(u, u.data[0], u.data[i]) }),
+      paths: (u, i) => {
+        this.rough[i] = strips(u, u.data[0], u.data[i]);
+        return this.rough[i] ? null : { stroke: linePath(u, u.data[0], u.data[i]) };
+      },
     }));
     const options = {
       ...this.size(),
@@ -79,6 +86,7 @@ export class TimeChart {
         bind: { dblclick: () => () => this.viewport.live() },
       },
       hooks: {
+        drawSeries: [(u, i) => this.rough[i] && this.drawRough(u, this.rough[i], this.lines[i - 1].line)],
         drawClear: [(u) => this.shade(u)],
         draw: [(u) => this.layOver(u), (u) => drawMarks(u, this.marks), (u) => drawMeasured(u, this.viewport.measured)],
         setCursor: [() => this.tell()],
@@ -97,14 +105,14 @@ export class TimeChart {
    * @param {Float64Array} t times of the numbers, s.
    * @param {{key: string, label: string, line: object, values: ArrayLike<number>}[]} lines
    * @param {object} more wall: {values, side} to shade, or null; marks; note for the end of the legend;
-   *   envelope: whether each two rows are the extremes of one interval; overlay: the table of another run, or null.
+   *   overlay: the table of another run, or null.
    */
-  show(span, t, lines, { wall = null, marks = [], note = "", envelope = false, overlay = null } = {}) {
+  show(span, t, lines, { wall = null, marks = [], note = "", overlay = null } = {}) {
     const signature = (list) => JSON.stringify(list.map(({ key, label }) => [key, label]));
-    const isNew = signature(lines) !== signature(this.lines) || envelope !== this.envelope;
+    const isNew = signature(lines) !== signature(this.lines);
     const climbs = this.climb(lines);
     const columns = lines.map(({ values }) => scaled(values, this.unit.factor));
-    Object.assign(this, { span, t, lines, wall, marks, note, envelope, overlay, columns });
+    Object.assign(this, { span, t, lines, wall, marks, note, overlay, columns });
     this.rerange();
     if (isNew || climbs) {
       this.legend.name(lines);
@@ -128,9 +136,10 @@ export class TimeChart {
   }
 
   draw() {
+    if (!this.isSeen) return;
     this.u.setData([this.t, ...this.columns], false);
     this.u.setScale("x", { min: this.span[0], max: this.span[1] });
-    this.tell();
+    this.tellSeldom();
   }
 
   retoggle() {
@@ -153,15 +162,24 @@ export class TimeChart {
 
   /** The same quantity of another run, faintly. */
   layOver(u) {
-    if (!this.overlay) return;
-    const values = scaled(this.overlay.columns[0].values, this.unit.factor);
+    if (!this.overlay) return undefined;
+    const [t, values] = [times(this.overlay), scaled(this.overlay.columns[0].values, this.unit.factor)];
+    const rough = strips(u, t, values);
+    if (rough) return this.drawRough(u, rough, OVERLAY);
     u.ctx.save();
     u.ctx.beginPath();
     u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
     u.ctx.clip();
-    u.ctx.strokeStyle = colour("mark");
-    u.ctx.lineWidth = devicePixelRatio;
-    u.ctx.stroke(linePath(u, times(this.overlay), values));
+    u.ctx.strokeStyle = colour(OVERLAY.colour);
+    u.ctx.lineWidth = OVERLAY.width * devicePixelRatio;
+    u.ctx.stroke(linePath(u, t, values));
+    return u.ctx.restore();
+  }
+
+  drawRough(u, found, { colour: name, width }) {
+    u.ctx.save();
+    u.ctx.fillStyle = colour(name);
+    drawStrips(u, found, width);
     u.ctx.restore();
   }
 
