@@ -100,7 +100,7 @@ def test_since_now_shows_nothing_older(tmp_path):
             await late.phase("paused")
             await asyncio.to_thread(run.ask, "step", ticks=50)
             await late.until("the step", lambda: late.state["tick"] >= 550)
-            await asyncio.sleep(1.0)  # longer than it takes to read a log
+            await asyncio.sleep(0.7)  # longer than it takes to read a log
             assert late.state["first_s"] == 0.5
             snapshot = await late.watch(span_s=None, points=1000)
             assert (snapshot["from_s"], snapshot["to_s"]) == (0.5, 0.55)
@@ -147,10 +147,10 @@ def test_a_paused_run_sends_its_snapshot_once(tmp_path):
     async def play(run, tab, here):
         await stands(run, 300)
         await whole(tab, run, 300)
-        await asyncio.sleep(0.7)
+        await asyncio.sleep(0.3)
         seen = tab.snapshots
         states = tab.state
-        await asyncio.sleep(1.0)
+        await asyncio.sleep(0.6)
         assert tab.snapshots == seen
         assert tab.state is not states
         await tab.watch(span_s=0.1)

@@ -34,6 +34,8 @@ _AT = "The page is at {} ({} ends it)"
 _ENDS = ("Ctrl-C", "closing it")
 # A run waits so long for its viewer.
 _HELD_S = 10.0
+# A viewer steps back where a run wants the processor.
+_NICE = 5
 # Recorded runs are looked for here, and so many of them offered.
 _RUNS, _MOST_PAST = "runs", 50
 
@@ -166,6 +168,8 @@ def view(
             until_closed=until_closed,
         )
 
+    with contextlib.suppress(AttributeError, OSError):  # no such thing on this system, or not allowed
+        os.nice(_NICE)
     with contextlib.suppress(KeyboardInterrupt):
         asyncio.run(main())
 
