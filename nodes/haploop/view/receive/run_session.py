@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import time as wall_clock
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 
 import zmq
@@ -52,16 +53,18 @@ class RunSession:
             self._context.destroy(linger=0)
             raise
         welcome = self._observer.welcome
-        self.scene = Scene.from_dict(welcome["scene"])
-        self.time = Timebase(**welcome["timebase"])
-        self.out = Path(welcome["context"]["out"])
-        window = self.scene.run.window_blocks * self.scene.run.block_ticks
-        self.history = History(self.time, max(0, welcome["granted"] - window))
+        time, scene = Timebase(**welcome["timebase"]), Scene.from_dict(welcome["scene"])
+        window = scene.run.window_blocks * scene.run.block_ticks
+        history = History(time, max(0, welcome["granted"] - window))
+        self._begin(scene, time, Path(welcome["context"]["out"]), history)
+        self.clock = ClockAnswers(runs, run, self.events, self.scene)
+
+    def _begin(self, scene: Scene, time: Timebase, out: Path, history: History) -> None:
+        self.scene, self.time, self.out, self.history = scene, time, out, history
         self.status: Message = {}
         self.events: list[tuple[int, Event]] = []
-        self.changes = Changes(self.scene.encoder.resolution if self.scene.encoder else 0.0)
-        self.clock = ClockAnswers(runs, run, self.events, self.scene)
-        self.delay_s = self.scene.clock.round_trip_delay
+        self.changes = Changes(scene.encoder.resolution if scene.encoder else 0.0)
+        self.delay_s = scene.clock.round_trip_delay
         self.outcome = self.why = ""
         self.given_up = False
         self.summary: Summary | None = None
@@ -89,7 +92,9 @@ class RunSession:
             self.end("ended", "")
 
     def _note_events(self) -> None:
-        events = self._observer.take_events()
+        self._take(self._observer.take_events())
+
+    def _take(self, events: Sequence[tuple[int, Event]]) -> None:
         self.events += events
         for _, event in events:
             self.delay_s = event.get("set", {}).get(DELAY, self.delay_s)

@@ -24,52 +24,36 @@ class CommandFailed(Exception):
 
 
 class Run(Protocol):
-    """A live run as other processes find it."""
+    """A live run as other processes find it.
+
+    Attributes:
+        id, title: identifier among live runs; title of its scene.
+        clock: address of the clock.
+        is_here: whether its files are on this machine.
+    """
 
     @property
-    def id(self) -> str:
-        """Identifier among live runs."""
-        ...
-
+    def id(self) -> str: ...
     @property
-    def title(self) -> str:
-        """Title of its scene."""
-        ...
-
+    def title(self) -> str: ...
     @property
-    def clock(self) -> str:
-        """Address of the clock."""
-        ...
-
+    def clock(self) -> str: ...
     @property
-    def is_here(self) -> bool:
-        """Whether its files are on this machine."""
-        ...
+    def is_here(self) -> bool: ...
 
     def make_context(self) -> SecureContext:
-        """Makes a context whose sockets may connect to the run."""
+        """Makes a context whose sockets may connect to the run; nobody asks for one of a run that is over."""
         ...
 
 
-class PastRun(Protocol):
-    """A recorded run that is over."""
-
-    id: str
-    out: Path
-    clock: str
-    is_here: bool
+class PastRun(Run, Protocol):
+    """A recorded run that is over; ``out`` is its folder."""
 
     @property
-    def title(self) -> str:
-        """Its name for people."""
-        ...
+    def out(self) -> Path: ...
 
     def scene(self) -> Scene:
         """Reads its resolved scene; raises OSError or LogError where there is none."""
-        ...
-
-    def make_context(self) -> SecureContext:
-        """Is not called: nobody is there to connect to."""
         ...
 
 
