@@ -3,29 +3,8 @@
 import pytest
 from playwright.sync_api import expect
 
-from helpers.live.stand_in import RUNNING, WAITING
+from helpers.live.stand_in import ENDED, RUNNING, SUMMARY, WAITING
 from oracles.snapshots import contact
-
-LEAK = {"total_J": -1.2e-3, "sampling_and_hold_J": -1e-4, "quantisation_J": 2e-6, "delay_J": -1.1e-3}
-SUMMARY = {
-    "title": RUNNING["title"], "duration_s": 3.0, "ended": "done", "verdict": "limit-cycle",
-    "verdict_rule": "Pushes of 0.195 N and a tenth of it end in the same swing.", "trajectory_sha256": "ab" * 32,
-    "stability": {
-        "rate_1_s": -0.0123, "error_1_s": 0.02, "frequency_Hz": 7.1, "width_m": 5.35e-3, "spread_m": 4.2e-4,
-        "force_ripple_N": 0.41, "felt": True, "chaotic": True, "own_share": 0.93,
-    },
-    "extremes": {"x_min_m": -0.0642, "x_max_m": 0.0, "force_max_N": 0.81}, "real_time_factor": 21.0,
-    "lost": {"commands_dropped": 3, "commands_lost": 0, "telemetry_gaps": 0},
-    "energy": {
-        "wall": {"sampled_J": -1.1e-3, "true_J": -1.3e-3, "leak": LEAK},
-        "elements": [{"kind": "damping", "from_tick": 0, "to_tick": 3000, "sampled_J": 9e-4, "true_J": 1e-3}],
-        "moved_J": 6e-3, "residual_J": 2e-18,
-    },
-}  # fmt: skip
-ENDED = {
-    "phase": "ended", "tick": 3000, "verdict": "limit-cycle", "verdict_is": "judged", "options": None,
-    "summary": SUMMARY, "nodes": [],
-}  # fmt: skip
 
 
 def test_without_a_run_it_says_how_to_start_one_and_offers_nothing_that_steers(stand_in, open_page):
@@ -82,6 +61,10 @@ def test_what_the_window_sees_is_an_outline_and_says_that_nothing_is_known_of_st
         expect(page.locator("#verdict span")).to_have_text(told)
         expect(page.locator("#summary-title")).to_have_text(f"Ended: {told}")
         assert style(page, "borderTopStyle") != "none"
+    for word, told in (("dying away", "last seen: dying away"), ("no swing seen", "")):
+        stand_in.state(**ENDED | {"verdict": "steady", "sight": sight | {"word": word}})
+        expect(page.locator("#verdict span")).to_have_text("steady")
+        expect(page.locator("#seen")).to_have_text(told)
     stand_in.state(**ENDED | {"summary": None, "verdict_is": "unknown", "why": "Its summary cannot be read."})
     expect(page.locator("#verdict span")).to_have_text("not known")
     expect(page.locator("#notice")).to_contain_text("Its summary cannot be read.")

@@ -6,17 +6,12 @@ import pytest
 from playwright.sync_api import expect
 
 from helpers.live.browser import DESK, PHONE
-from helpers.live.stand_in import WAITING
+from helpers.live.stand_in import ENDED, RUNS, WAITING
 from oracles.snapshots import contact
-from test_answers import ENDED
 
 pytestmark = pytest.mark.slow
 AXE = Path(__file__).parent / "node_modules/axe-core/axe.min.js"
 EVENT = {"tick": 500, "t_s": 0.5, "text": "set", "kind": "set"}
-RUNS = {
-    "type": "runs", "live": [{"id": "abc123", "title": "one"}, {"id": "def456", "title": "two"}],
-    "past": [{"id": "wall-1", "title": "wall-1"}], "shown": "abc123", "overlay": None,
-}  # fmt: skip
 PANELS = ("energy", "spectrum", "compare", "motion", "own")
 RUN = "within => axe.run(within, {resultTypes: ['violations']}).then(found => found.violations" \
       ".map(one => `${one.id}: ${one.nodes[0].target} and ${one.nodes.length - 1} more`))"  # fmt: skip

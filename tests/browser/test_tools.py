@@ -7,15 +7,11 @@ import pytest
 from playwright.sync_api import expect
 
 from helpers.live.browser import order
-from helpers.live.stand_in import OPTIONS, RUNNING
+from helpers.live.stand_in import OPTIONS, RUNNING, RUNS
 from oracles.snapshots import contact, snapshot, table
 
 pytestmark = pytest.mark.slow
 ROWS = [("hand", -2e-3), ("delay", -1e-3), ("damping", 2.5e-3), ("put into store", 5e-4)]
-RUNS = {
-    "type": "runs", "live": [{"id": "abc123", "title": "one"}, {"id": "def456", "title": "two"}],
-    "past": [{"id": "wall-1", "title": "wall-1"}], "shown": "abc123", "overlay": None,
-}  # fmt: skip
 
 
 def with_header(data: bytes, **more) -> bytes:

@@ -99,6 +99,22 @@ def test_a_force_that_buzzes_while_the_position_rests_is_told():
     assert loud.frequency_Hz == pytest.approx(700.0 / (2 * np.pi), rel=0.01)
 
 
+def test_what_was_not_received_is_no_number_that_is_not_finite():
+    """A page that joins, or lost some telemetry, holds rows that nobody sent: another regime begins after them."""
+    for missing in (0, 1500, 2700):
+        history, held = history_of(sine(40.0, 1e-3), lambda t: 0.1), History(TIME, 0)
+        gap = range(missing, missing + 100)
+        for first, end in ((0, missing), (missing + 100, 3000)):
+            for own, its in zip(held.all_series[:2], history.all_series[:2], strict=True):
+                if first < end:
+                    own.append(first, dict(zip(its.names, its.rows(its.names, first, end), strict=True)))
+        held.at_work = history.at_work
+        held.ticks.begin(0)
+        found = see(held, 0, 3000, COUNT_M)
+        assert found
+        assert (found.word, found.from_s) == (("settling", 2.8) if missing == 2700 else ("swinging", 2.5)), gap
+
+
 def test_growth_and_decay_have_words_of_their_own():
     def grows(rate):
         return lambda t: -5e-3 + 1e-4 * np.exp(rate * (t - 3.0)) * np.sin(2 * np.pi * 30 * t)

@@ -1,9 +1,12 @@
 """Recorded runs on the page: found, opened, drawn over another, and refused by a sentence where they are not there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from haploop.launch import load, run
+from haploop.launch.runs.run_files import recorded_scene
 from haploop.tools.cli.view import LiveRuns
 from haploop.view.draw.messages import state
 from haploop.view.draw.snapshot import Viewport, snapshot
@@ -57,6 +60,14 @@ def test_a_viewer_shows_one_recorded_run_and_draws_another_over_it(recorded):
     assert not np.array_equal(own, other), "the walls are not alike"
     late = decode(snapshot(session.history, Viewport(0.2, 2000, None), None, None))["tables"]
     assert "overlay_position" not in late
+
+
+def test_a_loop_with_an_element_that_is_not_installed_has_no_limit_of_stiffness(recorded):
+    scene = recorded_scene(LiveRuns().past()[0].out, {})
+    assert scene
+    assert LiveRuns().stiffness_limit(replace(scene, dissipation=()))
+    unknown = replace(scene, dissipation=(replace(scene.dissipation[0], name="of a plugin"),))
+    assert LiveRuns().stiffness_limit(unknown) is None
 
 
 def test_what_cannot_be_read_is_refused_and_what_was_shown_stays(recorded, tmp_path):

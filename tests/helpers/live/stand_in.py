@@ -72,6 +72,30 @@ WAITING: dict[str, Any] = {
     "moved_J": None, "nodes": [], "skipped_ticks": 0, "first_s": None, "options": None, "elements": [], "wall": None,
     "delay_s": None, "summary": None,
 }  # fmt: skip
+LEAK = {"total_J": -1.2e-3, "sampling_and_hold_J": -1e-4, "quantisation_J": 2e-6, "delay_J": -1.1e-3}
+SUMMARY = {
+    "title": RUNNING["title"], "duration_s": 3.0, "ended": "done", "verdict": "limit-cycle",
+    "verdict_rule": "Pushes of 0.195 N and a tenth of it end in the same swing.", "trajectory_sha256": "ab" * 32,
+    "stability": {
+        "rate_1_s": -0.0123, "error_1_s": 0.02, "frequency_Hz": 7.1, "width_m": 5.35e-3, "spread_m": 4.2e-4,
+        "force_ripple_N": 0.41, "felt": True, "chaotic": True, "own_share": 0.93,
+    },
+    "extremes": {"x_min_m": -0.0642, "x_max_m": 0.0, "force_max_N": 0.81}, "real_time_factor": 21.0,
+    "lost": {"commands_dropped": 3, "commands_lost": 0, "telemetry_gaps": 0},
+    "energy": {
+        "wall": {"sampled_J": -1.1e-3, "true_J": -1.3e-3, "leak": LEAK},
+        "elements": [{"kind": "damping", "from_tick": 0, "to_tick": 3000, "sampled_J": 9e-4, "true_J": 1e-3}],
+        "moved_J": 6e-3, "residual_J": 2e-18,
+    },
+}  # fmt: skip
+ENDED = {
+    "phase": "ended", "tick": 3000, "verdict": "limit-cycle", "verdict_is": "judged", "options": None,
+    "summary": SUMMARY, "nodes": [],
+}  # fmt: skip
+RUNS = {
+    "type": "runs", "live": [{"id": "abc123", "title": "one"}, {"id": "def456", "title": "two"}],
+    "past": [{"id": "wall-1", "title": "wall-1"}], "shown": "abc123", "overlay": None,
+}  # fmt: skip
 
 
 # A test gives up after so long.

@@ -78,12 +78,17 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     came = end - len(inside) + int(np.argmax(inside)) if inside.any() else None
     if came is not None and came > max(begin, end - window) and came > end - len(inside):
         begin, by = came, f"contact at {came / rate:g} s"
+    n = history.time.steps_per_tick
+    recent = history.steps.rows(("x", "force"), held := max(begin, end - _LONG * window), end)
+    lacking = np.flatnonzero(np.isnan(recent).any(axis=0))
+    if len(lacking) and lacking[-1] < recent.shape[1] - 1:  # not received: what is no number stays so to the end
+        begin = held + int(lacking[-1]) // n + 1
+        by = f"what is missing before {begin / rate:g} s"
     so_far = end - begin < window
     first = max(begin, end - window)
     if end - first < 4:
         return Sight("settling", _WHY["settling"].format(window=WINDOW_S, begin=by), first / rate, end / rate, True)
     long_first = max(begin, end - _LONG * window)
-    n = history.time.steps_per_tick
     x, force = history.steps.rows(("x", "force"), first, end)
     slow = history.steps.rows(("x",), long_first, end)[0][::n]
     if not (np.isfinite(x).all() and np.isfinite(force).all() and np.isfinite(slow).all()):

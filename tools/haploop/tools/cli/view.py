@@ -92,11 +92,12 @@ class LiveRuns:
 
     def stiffness_limit(self, scene: Scene) -> float | None:
         """Returns the largest stiffness with which the linear map of a loop is stable, N/m; None where it has none."""
+        from haploop.controller.dissipation.element import ElementError
         from haploop.tools.linear.one_tick import OneTickMap
 
         try:
             limit = OneTickMap.from_scene(scene).stiffness_limit()
-        except (ValueError, KeyError, ArithmeticError):  # no linear loop, none stable, or an element not installed
+        except (ElementError, ValueError, KeyError, ArithmeticError):  # not linear, never stable, or a plugin's element
             return None
         return limit if math.isfinite(limit) else None
 

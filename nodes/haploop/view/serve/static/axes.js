@@ -10,6 +10,7 @@ const LEFT_PX = 66;
 const BOTTOM_PX = 20;
 const BARE_PX = 5;
 const LABEL_PX = 17;
+const DIGIT_PX = 7;
 
 const common = () => ({
   stroke: () => colour("ink"),
@@ -26,8 +27,18 @@ const numbers = (u, splits, axis, space, step) => axisNumbers(splits, step);
 /** The axis to the left. */
 export const leftAxis = (label) => ({ ...common(), scale: "y", label, size: LEFT_PX, space: 24, values: numbers });
 
-/** The axis below; `space` px at least lie between its numbers. */
-export const bottomAxis = (label, space = 56) => ({ ...common(), scale: "x", label, size: BOTTOM_PX, space, values: numbers });
+/** The axis below; `space` px at least lie between its numbers, and more where they are long. */
+export const bottomAxis = (label, space = 56) => ({
+  ...common(),
+  scale: "x",
+  label,
+  size: BOTTOM_PX,
+  space: (u, axis, low, high) => Math.max(space, DIGIT_PX * (2 + widest(low, high))),
+  values: numbers,
+});
+
+/** The most characters of a number between these, about a quarter of the way from the next. */
+const widest = (low, high) => Math.max(...axisNumbers([low, high], 10 ** Math.floor(Math.log10((high - low) / 4))).map(({ length }) => length));
 
 /** The axis below a chart whose times stand below another one. */
 export const bareAxis = () => ({

@@ -31,7 +31,7 @@ export class Field {
     [this.unit, this.factor] = SHOWN_AS[quantity.unit] ?? [quantity.unit, 1];
     this.choices = quantity.choices?.map((choice) => JSON.stringify(choice));
     this.input = this.choices
-      ? make("select", { id }, ...this.choices.map((choice) => make("option", { value: choice }, choice)))
+      ? make("select", { id }, ...this.choices.map((choice) => make("option", { value: choice }, String(JSON.parse(choice)))))
       : make("input", { id, type: "text", inputmode: "decimal", autocomplete: "off", spellcheck: "false" });
     this.input.setAttribute("aria-describedby", `${id}-unit ${id}-problem`);
     this.problem = make("span", { class: "problem", id: `${id}-problem`, role: "alert" });
@@ -39,7 +39,7 @@ export class Field {
     const label = make("label", { for: id }, ...breakable(name));
     this.element = make("p", { class: "field" }, label, this.input, unit, this.problem);
     this.input.addEventListener("input", () => this.complain(this.complaint()));
-    this.present = "";
+    this.present = this.choices?.[0] ?? "";
     this.before = undefined;
     this.heldUntil = 0;
   }

@@ -50,9 +50,12 @@ function showVerdict(state) {
   sought.dataset.verdict = known;
   sought.dataset.is = state.verdict_is ?? "seen";
   sought.title = (isJudged(state) ? state.verdict_rule : sight?.why) ?? "";
-  put(byId("seen"), isJudged(state) || is in NOT_YET ? "" : seen(sight));
+  put(byId("seen"), isJudged(state) ? moved(state) : is in NOT_YET ? "" : seen(sight));
   sign(sought, `verdict-${known}`, told(state) || "no verdict");
 }
+
+/** What is seen still where a loop is judged steady: a swing that dies away is steady, and in the picture. */
+const moved = ({ verdict, sight }) => (verdict === "steady" && (sight?.word in SIGNS || sight?.word === "dying away") ? `last seen: ${sight.word}` : "");
 
 /** Of when a word is: of how much of the half second that it takes, or of which. */
 function seen(sight) {

@@ -8,6 +8,7 @@ import { OwnPanel } from "./own_panel.js";
 import { PhasePlots } from "./phase_plots.js";
 import { SpectrumChart } from "./spectrum_chart.js";
 
+const LOOPS_MS = 50;
 const NEXT = { ArrowRight: 1, ArrowLeft: -1 };
 
 export class Panels {
@@ -22,7 +23,8 @@ export class Panels {
       motion: new MotionPanel(byId("motion")),
       own: new OwnPanel(byId("own"), viewport),
     };
-    // Bars and tables are read, not watched.
+    // Bars and tables are read, not watched; of a loop, some pictures a second are enough.
+    this.panels.loops.show = seldom(this.panels.loops.show.bind(this.panels.loops), LOOPS_MS);
     for (const panel of [this.panels.energy, this.panels.compare]) panel.show = seldom(panel.show.bind(panel));
     this.tabs = [...document.querySelectorAll("[role=tab]")];
     for (const tab of this.tabs) tab.addEventListener("click", () => this.choose(tab.dataset.panel));

@@ -41,7 +41,7 @@ export class SetForm {
     const typed = new Map(this.changed().map((field) => [field.name, field.input.value]));
     const focused = this.fields.find(({ input }) => input === document.activeElement)?.name;
     this.fields = Object.entries(settable).map(([key, quantity]) => new Field(`set-${key}`, key, quantity));
-    this.sliders = this.fields.filter(({ quantity }) => quantity.unit !== "s").map((field) => new Slider(field, () => this.set()));
+    this.sliders = this.fields.filter(({ quantity, choices }) => quantity.unit !== "s" && !choices).map((field) => new Slider(field, () => this.set()));
     byId("set-fields").replaceChildren(...this.fields.map(({ element }) => element));
     for (const field of this.fields) {
       field.show(settable[field.name].value);

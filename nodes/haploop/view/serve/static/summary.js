@@ -16,7 +16,7 @@ export function showSummary(state) {
   if (!summary || panel.dataset.known === known) return;
   panel.dataset.known = known;
   panel.replaceChildren(
-    make("h2", { id: "summary-title" }, `Ended: ${told(state)}`),
+    make("h2", { id: "summary-title" }, `${summary.ended === "failed" ? "Failed; last seen" : "Ended"}: ${told(state) ?? NONE}`),
     make("p", { class: "about" }, (isJudged(state) ? summary.verdict_rule : state.sight?.why) ?? ""),
     make("p", { class: "balance" }, summary.energy?.balance ?? ""),
     rows({ ...pushed(summary.stability ?? {}), ...figures(summary), ...foreign(summary.programs) }),

@@ -67,7 +67,7 @@ export class SwapForm {
     byId("swap-where").hidden = kind === REMOVE;
     this.fields = Object.entries(parameters).map(([name, quantity]) => {
       const field = new Field(`swap-${name}`, name, quantity);
-      field.show(element?.kind === kind ? element[name] : quantity.default);
+      field.show((element?.kind === kind ? element[name] : null) ?? quantity.default);
       return field;
     });
     byId("swap-fields").replaceChildren(...this.fields.map(({ element: row }) => row));
