@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from haploop.logger.log import LogError
 from haploop.protocol.transport.clock_client import Aborted, Refused
 from haploop.protocol.transport.wire import Message
+from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.receive.ingest import Backfill
 from haploop.view.receive.past_session import PastSession
 from haploop.view.receive.run_session import RunSession
@@ -23,6 +24,8 @@ _LOOK_S, _IDLE_TURN_S = 0.2, 0.05
 _LOOKS = 10
 # The log is written at least so often: after this time it holds what was received before.
 _LOGGED_S = 0.6
+# Pages look at so many parts of a run at once, without making one twice.
+_MOST_MADE = 4
 # Runs to choose from are looked for so often.
 _LIST_S = 2.0
 
@@ -47,10 +50,23 @@ class Viewer:
         self.overlay: RunSession | None = None
         self._followed: RunSession | None = None
         self._listed: tuple[float, Message] = -math.inf, {}
+        self._made: dict[tuple[object, ...], bytes] = {}
 
     async def wait_for_update(self) -> None:
         """Waits until what there is to show may have changed."""
         await self._updated.wait()
+
+    def snapshot(self, viewport: Viewport) -> tuple[tuple[object, ...], bytes] | None:
+        """Returns what is shown in a viewport, made once for all pages that ask, and what tells it from others."""
+        if (session := self.session) is None:
+            return None
+        key = session.history, session.history.version, self.overlay, viewport
+        if key not in self._made:
+            overlay = self.overlay and self.overlay.history
+            others = [(known, data) for known, data in self._made.items() if known[:3] == key[:3]]
+            self._made = dict(others[-_MOST_MADE:])
+            self._made[key] = snapshot(session.history, viewport, session.changes, overlay)
+        return key, self._made[key]
 
     def _notify_pages(self) -> None:
         turned, self._updated = self._updated, asyncio.Event()

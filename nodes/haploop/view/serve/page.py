@@ -17,7 +17,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from haploop.protocol.transport.wire import Message
 from haploop.view.draw.messages import WAITING, event_lines, state
 from haploop.view.draw.panels import PANELS
-from haploop.view.draw.snapshot import Viewport, snapshot
+from haploop.view.draw.snapshot import Viewport
 from haploop.view.receive.runs import CommandFailed
 from haploop.view.serve.guard import Guard
 from haploop.view.viewer import Viewer
@@ -124,15 +124,9 @@ class Page:
                 await self._send(listing)
 
     async def _send_snapshot(self) -> None:
-        if (session := self._viewer.session) is None or not self._has_drawn:
-            return
-        overlay = self._viewer.overlay
-        showing = (session.history, session.history.version, self._viewport, overlay)
-        if showing != self._sent_snapshot:
-            self._sent_snapshot, self._has_drawn = showing, False
-            await self._socket.send_bytes(
-                snapshot(session.history, self._viewport, session.changes, overlay and overlay.history)
-            )
+        if self._has_drawn and (made := self._viewer.snapshot(self._viewport)) and made[0] != self._sent_snapshot:
+            self._sent_snapshot, self._has_drawn = made[0], False
+            await self._socket.send_bytes(made[1])
 
     async def _send(self, message: Message) -> None:
         await self._socket.send_str(json.dumps(message, allow_nan=False))

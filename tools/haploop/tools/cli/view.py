@@ -35,7 +35,7 @@ _ENDS = ("Ctrl-C", "closing it")
 # A run waits so long for its viewer.
 _HELD_S = 10.0
 # A viewer steps back where a run wants the processor.
-_NICE = 5
+_NICE = 10
 # Recorded runs are looked for here, and so many of them offered.
 _RUNS, _MOST_PAST = "runs", 50
 
