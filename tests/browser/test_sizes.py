@@ -5,7 +5,7 @@ from playwright.sync_api import expect
 
 from helpers.live.browser import DESK, PHONE
 from helpers.live.launched import first_and_slowly
-from helpers.live.stand_in import RUNNING
+from helpers.live.stand_in import ENDED, RUNNING, RUNS
 from oracles.snapshots import contact
 
 TABLET, LARGE = {"width": 820, "height": 1180}, {"width": 1920, "height": 1080}
@@ -68,7 +68,7 @@ def scheme(request):
 
 def shown(stand_in, open_page, viewport, scheme, **options):
     stand_in.state()
-    stand_in.tell({"type": "events", "events": EVENTS})
+    stand_in.tell({"type": "events", "events": EVENTS}, RUNS)
     stand_in.show(contact())
     page = open_page(stand_in.url, viewport=viewport, color_scheme=scheme, **options)
     expect(page.locator("#force .legend")).to_contain_text("total")
@@ -98,6 +98,10 @@ def test_nothing_covers_anything_and_no_text_is_cut_off(viewport, stand_in, open
     assert page.evaluate(OVERLAPS) == []
     assert page.evaluate(CUT) == []
     assert page.evaluate("document.documentElement.scrollWidth") == viewport["width"], "no scrolling sideways"
+    stand_in.state(**ENDED)
+    expect(page.locator("#phase")).to_have_text("ended")
+    assert page.evaluate(CUT) == []
+    assert page.evaluate("document.documentElement.scrollWidth") == viewport["width"], "nor after the end"
 
 
 @pytest.mark.slow
