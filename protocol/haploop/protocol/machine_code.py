@@ -31,10 +31,11 @@ class MachineCode:
             sources = [Path(str(of)).read_bytes() for of in (__file__, file, *(of.__file__ for of in formulas))]
             self.kept = str(here / f"{Path(file).stem}-{sha256(b''.join(sources)).hexdigest()[:16]}")
 
-    def compiled(self, function: Any, **others: Callable[..., Any]) -> Any:
+    def compiled(self, function: Any, inlined: bool = False, **others: Callable[..., Any]) -> Any:
         """Returns a function of numbers and arrays as machine code, with IEEE arithmetic as it is written.
 
         Args:
+            inlined: whether it is written out where it is called, which spares handing over structures of arrays.
             others: what it calls by a name of its module, where that is to be something else.
         """
         import numba.core.config  # pyright: ignore[reportMissingImports]
@@ -44,7 +45,13 @@ class MachineCode:
             function = FunctionType(function.__code__, function.__globals__ | others)
         before, settings.CACHE_DIR = settings.CACHE_DIR, self.kept
         try:
-            return numba.njit(function, cache=bool(self.kept), fastmath=False, error_model="numpy")
+            return numba.njit(
+                function,
+                cache=bool(self.kept),
+                fastmath=False,
+                error_model="numpy",
+                inline="always" if inlined else "never",
+            )
         finally:
             settings.CACHE_DIR = before
 

@@ -19,6 +19,7 @@ pytestmark = pytest.mark.slow
 STRIBECK = {"kinetic": 0.03, "breakaway": 0.05, "stribeck_velocity": 0.01}
 SCENES: dict[str, dict[str, Any]] = {
     "one mass": {},
+    "a slow actuator": {"also": ("bandwidth", "transmission")},
     "a cable and a grip": {"also": ("transmission", "grip")},
     "breakaway": {"friction": {"kinetic": 0.03, "breakaway": 0.06}},
     "Stribeck": {"friction": STRIBECK, "also": ("transmission", "bandwidth")},
@@ -71,8 +72,9 @@ def test_so_has_a_batch_whatever_room_there_is_for_the_pieces(
 
 def test_a_rate_in_the_books_that_is_off_by_its_last_bit_is_seen(loops: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     scene, books = [scene_of("a cable and a grip")], segments.LOOPS.module()
-    expected, made = by(np.inf, monkeypatch, scene), books.integrate
-    monkeypatch.setattr(books, "integrate", lambda rates, forms, *of: made(np.nextafter(rates, 1.0), forms, *of))
+    expected, made = by(np.inf, monkeypatch, scene), books.books_by_step
+    off = lambda device: [*device[:3], np.nextafter(device[3], 1.0), *device[4:]]  # noqa: E731
+    monkeypatch.setattr(books, "books_by_step", lambda device, *of: made(off(device), *of))
     assert by(0, monkeypatch, scene) != expected
 
 

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from haploop.logger.books.buffers import PIECES
 from haploop.logger.books.one_mass import beyond_limits
-from haploop.logger.books.segments import BatchColumns, ChainForms, Columns, Segments, end_to_end
+from haploop.logger.books.segments import LOOPS, BatchColumns, ChainForms, Columns, Segments, end_to_end
 from haploop.logger.books.work import Displacement, by_interval, sum_rows, sum_steps
 from haploop.plant.chain.chain import Chain
 from haploop.plant.motion.hand_force import constant_forces, make_hand_force
@@ -68,9 +69,53 @@ class ChainBooks:
     ) -> Iterator[np.ndarray]:
         """Yields the energy each step adds to each book, J, shape (steps,), or (steps, batch), each."""
         tau = self._tau.at_steps(first_step, first_step + len(dx) + 1)
+        loops = LOOPS.module_for(dx.size) if dx.ndim == 1 or self._rubs else None
+        if loops and (found := self._by_loops(loops, first_step, columns, tau, dx.size // len(dx))) is not None:
+            return self._completed(found.reshape(-1, *dx.shape), columns["force"][:-1], dx, commanded)
         if not columns.get("pieces"):
             return self._of_run(first_step, columns, tau, dx, commanded)
         return self._with_cut_steps(first_step, columns, tau, dx, list(commanded))
+
+    def _by_loops(
+        self, loops: Any, first_step: int, columns: BatchColumns, tau: np.ndarray, members: int
+    ) -> np.ndarray | None:
+        """Returns what ``books_by_step`` of the loops does; None where these cannot serve."""
+        chain, steps = self._chain, len(tau) - 1
+        names = [*chain.states, *(f"{name}_low" for name in chain.positions), "friction", "stuck"]
+        of_each = columns.get("pieces") if columns["x"].ndim > 1 else [(0, columns)]
+        of_each = [(place, of) for place, of in of_each or () if len(of.get(f"{PIECES}step", ()))]
+        pieces, counts = np.zeros((len(names) + 3, 0)), np.zeros(members, np.int64)
+        if of_each:
+            parts = [
+                np.concatenate([of[PIECES + name] for _, of in of_each]) for name in (*names, "step", "level", "snap_J")
+            ]
+            pieces = np.stack(parts)
+            pieces[len(names)] -= first_step
+            counts[[place for place, _ in of_each]] = [len(of[f"{PIECES}step"]) for _, of in of_each]
+        kinds = np.flatnonzero(np.bincount((2 * pieces[-2] + pieces[len(names) - 1]).astype(np.int64)))
+        if (forms := self._forms.for_loops(kinds, loops)) is None:
+            return None
+        rows = np.empty((len(names) + 2, steps + 1, members))
+        for row, name in zip(rows, (*names, "force"), strict=False):
+            row[:] = columns[name].reshape(steps + 1, -1) if name in columns else 0.0
+        rows[-1] = tau.reshape(steps + 1, -1)
+        constants = [*self._constant.values()]
+        held_N = np.array([*constants, sum(constants)] if constants else [])
+        device = [np.array(chain.masses_kg), np.array([link.stiffness for link in chain.links]), np.array(chain.spring)]
+        first = np.append(0, np.cumsum(counts))
+        books = len(self._forms.names) + 3 + len(constants)
+        return loops.books_by_step([*device, *forms], rows, pieces, first, held_N, books)
+
+    def _completed(
+        self, found: np.ndarray, force: np.ndarray, dx: np.ndarray, commanded: Iterable[np.ndarray]
+    ) -> Iterator[np.ndarray]:
+        """Yields the books that the loops have found, with what the limits of the actuator keep from the device."""
+        lags = len(self._forms.names) - 1 - len(self._heats)
+        friction = 1 + len(self._heats) + lags
+        yield from (*found[: 1 + len(self._heats)], *found[friction + (not self._rubs) : friction + 3])
+        if self._is_limited:
+            yield (found[friction - 1] if lags else 0.0) + beyond_limits(commanded, force) * dx
+        yield from found[friction + 3 :]
 
     def _with_cut_steps(
         self, first_step: int, columns: BatchColumns, tau: np.ndarray, dx: np.ndarray, commanded: list[np.ndarray]

@@ -1,65 +1,165 @@
-"""A loop of machine code (numba) for the integrals that the books of a chain need; to the bits of NumPy."""
+"""A loop of machine code (numba) for the books of a chain whose first body sticks and slips; to the bits of NumPy."""
 
 from __future__ import annotations
+
+from functools import partial
 
 import numpy as np
 
 from haploop.protocol.machine_code import MachineCode
 
 _code = MachineCode(__file__, ())
+_inlined = partial(_code.compiled, inlined=True)
+# Integrals of products that are summed side by side; no chain has more.
+_PRODUCTS = 8
+
+
+@_inlined
+def _rates_of(rates, lags, acting, rise, w):  # pragma: no cover
+    """Fills in the rates; returns the lag integral."""
+    count, states, lag = len(rates), rates.shape[1], 0.0
+    for i in range(count):
+        row, total = rates[i], 0.0
+        for j in range(states):
+            if row[j] != 0.0:
+                total += row[j] * acting[j]
+        w[i] = total
+    w[count] = rise
+    for i in range(count + 1):
+        if lags[i] != 0.0:
+            lag += lags[i] * w[i]
+    return lag
+
+
+@_inlined
+def _products_of(forms, w, found):  # pragma: no cover
+    a, b, c, d, e, f, g, h = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    pair = 0
+    for i in range(len(w)):
+        for j in range(i, len(w)):
+            both, of = w[i] * w[j], forms[pair]
+            a, b, c, d = a + of[0] * both, b + of[1] * both, c + of[2] * both, d + of[3] * both
+            e, f, g, h = e + of[4] * both, f + of[5] * both, g + of[6] * both, h + of[7] * both
+            pair += 1
+    found[0], found[1], found[2], found[3], found[4], found[5], found[6], found[7] = a, b, c, d, e, f, g, h
+
+
+@_inlined
+def _stored(masses, links, stiffness, rest, at, then, way):  # pragma: no cover
+    """Returns the changes of kinetic energy, and of that in the springs."""
+    n, states, v, dv, kinetic, beyond = len(masses), len(at) - len(masses), 0.0, 0.0, 0.0, at[0] - rest
+    for body in range(n):
+        v, dv = v + at[n + body], dv + (then[n + body] - at[n + body])
+        kinetic += masses[body] * dv * (v + dv / 2.0)
+    for i in range(1, n):
+        beyond += at[i]
+    for i in range(n):
+        beyond += at[states + i]
+    spring = stiffness * way * (beyond + way / 2.0)
+    for i in range(1, n):
+        change = (then[i] - at[i]) + (then[states + i] - at[states + i])
+        spring += links[i - 1] * change * (at[i] + change / 2.0)
+    return kinetic, spring
 
 
 @_code.compiled
-def _integrate(rates, forms, lags, kind, acting, rise, result):  # pragma: no cover
-    """Fills in the integrals of every segment; its kind is 2 * (its place in ``forms``) + whether body 0 is stuck."""
-    count, states, products = rates.shape[1], rates.shape[2], forms.shape[3]
-    w, total = np.empty(count + 1), np.empty(products)
-    for s in range(len(kind)):
-        of, lag, row = forms[kind[s] // 2], lags[kind[s] // 2], rates[kind[s] % 2]
-        for i in range(count):
-            w[i] = 0.0
-            for j in range(states):
-                if row[i, j] != 0.0:
-                    w[i] += row[i, j] * acting[j, s]
-        w[count] = rise[s]
-        total[:] = 0.0
-        for i in range(count + 1):
-            for j in range(i, count + 1):
-                both = w[i] * w[j]
-                for p in range(products):
-                    total[p] += of[i, j, p] * both
-        result[:-1, s] = total
-        last = 0.0
-        for i in range(count + 1):
-            if lag[i] != 0.0:
-                last += lag[i] * w[i]
-        result[-1, s] = last
+def _book(masses, links, spring, rates, forms, lags, which, rows, pieces, first, constant_N, found):  # pragma: no cover
+    """Fills in the books of each step; a segment is a step, or a piece of one."""
+    n, states, steps, members = len(masses), rates.shape[1], rows.shape[1] - 1, rows.shape[2]
+    constants = max(len(constant_N) - 1, 0)
+    columns, products, due = states + n, len(found) - 4 - constants, first.copy()
+    acting, w, heats, book = np.empty(states + 3), np.empty(states + 1), np.empty(_PRODUCTS), np.empty(len(found))
+    at, then = np.empty(columns), np.empty(columns)
+    for step in range(steps):
+        for m in range(members):
+            tau, over, is_last = rows[columns + 3, step, m], 0.0, False
+            rise, end, p = rows[columns + 3, step + 1, m] - tau, first[m + 1], due[m]
+            is_cut = p < end and pieces[columns + 2, p] == step
+            book[:] = 0.0
+            while not is_last:
+                is_last, level, snap_J = True, 0, 0.0
+                if is_cut:
+                    is_last = p + 1 == end or pieces[columns + 2, p + 1] != step
+                    friction, stuck = pieces[columns, p], int(pieces[columns + 1, p] > 0.0)
+                    level, snap_J = int(pieces[columns + 3, p]), pieces[columns + 4, p]
+                    for i in range(columns):
+                        at[i] = pieces[i, p]
+                    if not is_last:
+                        for i in range(columns):
+                            then[i] = pieces[i, p + 1]
+                    p += 1
+                else:
+                    friction, stuck = rows[columns, step, m], int(rows[columns + 1, step, m] > 0.0)
+                    for i in range(columns):
+                        at[i] = rows[i, step, m]
+                if is_last:
+                    for i in range(columns):
+                        then[i] = rows[i, step + 1, m]
+                start, lasts = tau + rise * over, 1.0 / (1 << level)
+                over += lasts
+                for i in range(states):
+                    acting[i] = at[i]
+                # The hand's spring pulls as far as it is from its rest; so no digits go to where the rest lies.
+                acting[0] = at[0] - spring[1] + at[states]
+                acting[states], acting[states + 1], acting[states + 2] = rows[columns + 2, step, m], friction, start
+                kind = which[2 * level + stuck]
+                lag = _rates_of(rates[stuck], lags[kind], acting, rise, w)
+                _products_of(forms[kind], w, heats)
+                way, moved = 0.0, (then[0] - at[0]) + (then[states] - at[states])
+                for i in range(n):
+                    way += (then[i] - at[i]) + (then[states + i] - at[states + i])
+                risen = rise * lasts
+                work = (start + risen / 2.0) * way + risen * lag
+                kinetic, stored = _stored(masses, links, spring[0], spring[1], at, then, way)
+                if constants:
+                    work -= constant_N[constants] * way
+                book[0] += work
+                for i in range(products):
+                    book[1 + i] += heats[i]
+                book[products + 1] += -friction * moved + snap_J
+                book[products + 2] += kinetic
+                book[products + 3] += stored
+                for i in range(constants):
+                    book[products + 4 + i] += constant_N[i] * way
+            due[m] = p
+            for i in range(len(found)):
+                found[i, step, m] = book[i]
 
 
-def integrate(
-    rates: np.ndarray, forms: list[tuple[np.ndarray, np.ndarray]], kind: np.ndarray, acting: list[np.ndarray],
-    rise: np.ndarray,
-) -> np.ndarray:  # fmt: skip
-    """Returns what ``ChainForms.integrals`` does, of segments whose forms are of float64.
+def books_by_step(device: list[np.ndarray], rows: np.ndarray, pieces: np.ndarray, first: np.ndarray,
+                  constant_N: np.ndarray, books: int) -> np.ndarray:  # fmt: skip
+    """Returns the energy that each step adds to each book, J, shape (books, steps, members).
+
+    The books are those of ``ChainBooks``, with the lag of the actuator, if there is one, after the heats of dampers.
 
     Args:
-        rates: with body 0 free and held, shape (2, rates, states + 3).
-        forms: (products, lag integral) of ``ChainForms.forms``.
-        kind: of each segment, 2 * (which of the forms) + whether body 0 is held.
-        acting: states, force, friction and tau, shape (segments,) each.
-        rise: of tau, shape (segments,).
+        device: masses in kg, stiffness of the links in N/m, (stiffness N/m, rest m) of the hand's spring, and what
+            ``ChainForms.for_loops`` returns.
+        rows: at each step and at the end, of each member: the states, what rounding left of the lengths, friction,
+            whether body 0 is stuck, the force held and tau; shape (states + lengths + 4, steps + 1, members).
+        pieces: of steps that were cut, by member and in order: the same up to stuck, then step, level and what setting
+            v to 0 threw away; shape (states + lengths + 5, pieces).
+        first: where the pieces of each member begin, and where the last end, shape (members + 1,).
+        constant_N: constant forces in tau, and last their sum, N; none of them, no sum.
     """
-    of_products = np.stack([products for products, _ in forms])
-    above = np.triu(np.full(of_products.shape[-2:], 2.0), 1) + np.eye(of_products.shape[-1])
-    of_pairs = np.ascontiguousarray(np.moveaxis(of_products * above, 1, -1))
-    result = np.empty((len(of_products[0]) + 1, len(kind)))
-    lags = np.stack([lag for _, lag in forms])
-    _integrate(rates, of_pairs, lags, kind, np.stack(acting), np.ascontiguousarray(rise), result)
-    return result
+    found = np.empty((books, rows.shape[1] - 1, rows.shape[2]))
+    _book(*device, rows, pieces, first, constant_N, found)
+    return found
+
+
+def pairs_of(forms: np.ndarray) -> np.ndarray:
+    """Returns quadratic forms, shape (kinds, products, rates, rates), as the loop takes them, by pairs of rates."""
+    kinds, products, size, _ = forms.shape
+    above, to = forms * (np.triu(np.full((size, size), 2.0), 1) + np.eye(size)), np.triu_indices(size)
+    table = np.zeros((kinds, len(to[0]), _PRODUCTS))
+    table[..., :products] = np.moveaxis(above[:, :, to[0], to[1]], 1, -1)
+    return table
 
 
 def try_out() -> None:
     """Compiles the loop, or loads it; raises whatever numba does."""
-    zeros, rates = np.zeros(1), np.zeros((2, 1, 4))
-    forms = [(np.zeros((1, 2, 2)), np.zeros(2))]
-    _code.try_out(lambda: integrate(rates, forms, np.zeros(1, np.int64), [zeros] * 4, zeros))
+    one = np.zeros(1)
+    forms = pairs_of(np.zeros((1, 1, 3, 3))), np.zeros((1, 3)), np.zeros(2, np.int64)
+    device = [one, np.zeros(0), np.zeros(2), np.zeros((2, 2, 5)), *forms]
+    pieces, first = np.zeros((8, 0)), np.zeros(2, np.int64)
+    _code.try_out(lambda: books_by_step(device, np.zeros((7, 2, 1)), pieces, first, one[:0], 5))

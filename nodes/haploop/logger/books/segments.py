@@ -170,7 +170,7 @@ class ChainForms:
         heats = [f"{name}_heat" for name in (*chain.grounded, *(link.name for link in chain.links))]
         self.names = [*heats, *["lag"] * (chain.actuator_rate is not None), "lag_integral"]
         self._made: Made = {}
-        self._of_batch = of_batch
+        self._of_batch, self._of_loops = of_batch, list[np.ndarray]()
         if of_batch:
             rates, *forms = make_tables(lambda one: _tables(one, step_s), chain, has_members=True)
             self._real: Any = np.float64
@@ -204,12 +204,6 @@ class ChainForms:
         states = segments.states.copy()
         states[0] = states[0] - self._chain.spring[1] + segments.lows[0]
         acting = [of.astype(self._real, copy=False) for of in (*states, force, segments.friction, tau)]
-        if force.ndim == 1 and self._real is np.float64 and (loops := LOOPS.module_for(len(force))):
-            kinds = segments.kinds()
-            found = np.flatnonzero(np.bincount(kinds))
-            forms = [self.forms(kind // 2, kind % 2 == 1) for kind in found.tolist()]
-            which = 2 * np.searchsorted(found, kinds) + segments.is_stuck
-            return loops.integrate(np.stack([*self._rates.values()]), forms, which, acting, rise)
         groups, result = segments.groups(), np.empty((len(self.names), *force.shape))
         if any(not isinstance(which, slice) for *_, which in groups):  # a mask selects from whole arrays alone
             acting, rise = [np.broadcast_to(of, force.shape) for of in acting], np.broadcast_to(rise, force.shape)
@@ -233,6 +227,24 @@ class ChainForms:
             made = forms, flow.lag(self._last, level)
             self._made[level, stuck] = made[0].astype(self._real), made[1].astype(self._real)
         return self._made[level, stuck]
+
+    def for_loops(self, kinds: np.ndarray, loops: Any) -> list[np.ndarray] | None:
+        """Returns what the loops of machine code need of some kinds and whole steps; None where floats are too short.
+
+        These are the rates with body 0 free and held, the forms of products and of the lag integral by kind, and the
+        place of each kind among them.
+        """
+        if self._of_batch or self._real is not np.float64:
+            return None
+        for kind in {0, 1, *kinds.tolist()}:
+            self.forms(kind // 2, kind % 2 == 1)
+        if not self._of_loops or len(self._of_loops[1]) != len(self._made):
+            forms = {2 * level + stuck: forms for (level, stuck), forms in self._made.items()}
+            products, lags = (np.stack(part) for part in zip(*forms.values(), strict=True))
+            which = np.zeros(max(forms) + 1, np.int64)
+            which[[*forms]] = np.arange(len(forms))
+            self._of_loops = [np.stack([*self._rates.values()]), loops.pairs_of(products), lags, which]
+        return self._of_loops
 
     def select(self, kept: np.ndarray) -> None:
         """Drops the members of a batch for which ``kept``, shape (members,), is false."""

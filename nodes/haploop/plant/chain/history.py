@@ -52,15 +52,23 @@ class Interval(NamedTuple):
     """Course of an interval; in a batch every array has one more axis, the last, for the members.
 
     Attributes:
+        course: all of what follows, side by side, shape (n + 1, columns); a row of the end has states alone.
         states, comps: at every plant step and at the end, shape (n + 1, states); what rounding left of the states.
         held: force and command tick (and whatever else) held over every step, shape (n, columns).
         at_ends: friction in N and whether body 0 is stuck at the end of every step, shape (n, 2).
     """
 
+    course: np.ndarray
     states: np.ndarray
     comps: np.ndarray
     held: np.ndarray
     at_ends: np.ndarray
+
+    @classmethod
+    def of(cls, course: np.ndarray, states: int) -> Interval:
+        """Returns the parts of a course of so many states."""
+        of_steps = course[:-1, 2 * states :]
+        return cls(course, course[:, :states], course[:, states : 2 * states], of_steps[:, :-2], of_steps[:, -2:])
 
 
 class ChainHistory(ABC):
@@ -116,16 +124,16 @@ class ChainHistory(ABC):
     def _begin(self, holds: list[Hold]) -> Interval:
         """Returns an interval of which the start is known, and what is held in it."""
         z, z_comp, *_ = self.state
-        states, comps = np.empty((2, self._n + 1, *z.shape))
-        states[0], comps[0] = z, z_comp
-        held = np.empty((self._n, len(self.held_names), *z.shape[1:]))
-        first = 0
+        size, first = len(z), 0
+        course = np.empty((self._n + 1, 2 * size + len(self.held_names) + 2, *z.shape[1:]))
+        course[0, :size], course[0, size : 2 * size], course[:, -2:] = z, z_comp, 0.0
         for count, force, command in holds:
-            held[first : first + count, 0], held[first : first + count, 1] = force, command
+            course[first : first + count, 2 * size] = force
+            course[first : first + count, 2 * size + 1] = command
             first += count
         if self._members is not None:
             self._forces += [force for _, force, _ in holds]
-        return Interval(states, comps, held, np.zeros((self._n, 2, *[1] * (z.ndim - 1))))
+        return Interval.of(course, size)
 
     @abstractmethod
     def advance(self, tick: int, holds: list[Hold]) -> Any:
@@ -134,7 +142,7 @@ class ChainHistory(ABC):
     def _accept(self, tick: int, interval: Interval, mode: StickSlipState | None = None) -> Any:
         """Takes the interval for what happened; returns x at its end, m."""
         self._done.append(interval)
-        states, comps, held, at_ends = interval
+        _, states, comps, held, at_ends = interval
         sensed = self._sensor.after(self.state.sensed, states, held[:, 0], at_ends, tick * self._n + 1)
         self.state = ChainState(states[-1], comps[-1], held[-1], sensed, mode)
         return self.x

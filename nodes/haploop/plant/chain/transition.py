@@ -17,7 +17,7 @@ from haploop.protocol.trees import tree_leaves, tree_select, tree_unflatten
 Loads = Callable[[int, int], np.ndarray]
 _wide = np.longdouble
 # Responses to the load are made for this many intervals at a time, on a fixed grid; in a batch for fewer.
-_PIECE_TICKS, _PIECE_TICKS_OF_A_BATCH = 64, 8
+_PIECE_TICKS, _PIECE_TICKS_OF_A_BATCH = 256, 8
 
 
 class ChainTransition:

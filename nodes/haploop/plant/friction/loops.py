@@ -5,193 +5,167 @@ The formulas are those of ``stick_slip`` and ``substeps`` as they stand; so are 
 
 from __future__ import annotations
 
-from itertools import accumulate
-from typing import NamedTuple
-
 import numpy as np
 
 from haploop.plant.chain import motion
-from haploop.plant.chain.history import Interval, StickSlipState
-from haploop.plant.friction import stick_slip, substeps
+from haploop.plant.chain.history import StickSlipState
+from haploop.plant.friction import step_loop, stick_slip, substeps
+from haploop.plant.friction.step_loop import (
+    STATES,
+    decide_at_rest,
+    holds_through,
+    may_switch_within,
+    slipping,
+    slipping_at,
+    solve_step,
+)
 from haploop.plant.friction.stick_slip import Row, StickSlip
 from haploop.plant.line import Hold
 from haploop.protocol.machine_code import MachineCode
 
-_code = MachineCode(__file__, (motion, stick_slip, substeps))
+_code = MachineCode(__file__, (motion, step_loop, stick_slip, substeps))
+_lost_in = _code.compiled(motion.lost_in, inlined=True)
 # Pieces that are kept before they are handed over.
 _PIECES = 16_384
-
-
-class Pieces(NamedTuple):
-    """Rows of ``substeps.pieces_record``, and how many there are, or were to be."""
-
-    rows: np.ndarray
-    noted: np.ndarray
+# Members taken out of a batch at a time: what lies side by side in memory is then read and written together.
+_TOGETHER = 8
 
 
 @_code.compiled
-def _row_on(row, z, command, load):  # pragma: no cover
-    total = row.of_command * command + row.of_load * load
-    for i in range(len(row.of_states)):
-        if row.of_states[i] != 0.0:
-            total = total + row.of_states[i] * z[i]
-    return total
-
-
-@_code.compiled
-def _moved(table, z, z_comp, command, friction, load, rise):  # pragma: no cover
-    size = len(z)
-    after, change = np.empty(size), np.zeros(size)
-    for i in range(size):
-        for j in range(size):
-            change[j] += table[i, j] * z[i]
-    for j in range(size):
-        total = change[j] + table[size, j] * command + table[size + 1, j] * friction
-        total = total + table[size + 2, j] * load + table[size + 3, j] * rise + z_comp[j]
-        after[j] = z[j] + total
-        change[j] = total - (after[j] - z[j])
-    return after, change
-
-
-@_code.compiled
-def _same(z):  # pragma: no cover
-    return z
-
-
-@_code.compiled
-def _count_of(pieces):  # pragma: no cover
-    return pieces.noted[0]
-
-
-@_code.compiled
-def _drop_last(pieces):  # pragma: no cover
-    pieces.noted[0] -= 1
-
-
-@_code.compiled
-def _is_full(pieces, first, step):  # pragma: no cover
-    return pieces.noted[0] > len(pieces.rows)
-
-
-@_code.compiled
-def _note(pieces, of, head, begin, comp):  # pragma: no cover
-    at, size = pieces.noted[0], len(begin)
-    pieces.noted[0] = at + 1
-    if at < len(pieces.rows):
-        row = pieces.rows[at]
-        row[0], row[1], row[2], row[3], row[4], row[5] = head
-        row[6 : 6 + size] = begin
-        row[6 + size :] = comp[: of.v]
-
-
-_friction_at, _against = _code.compiled(stick_slip.friction_at), _code.compiled(stick_slip.holds_against)
-_forces = {"row_on": _row_on, "holds_against": _against}
-_decide_at_rest = _code.compiled(stick_slip.decide_at_rest, **_forces)
-_holds_through = _code.compiled(stick_slip.holds_through, **_forces)
-_tangents = _code.compiled(stick_slip.tangents_meet_below)
-_may_switch_within = _code.compiled(stick_slip.may_switch_within, row_on=_row_on, tangents_meet_below=_tangents)
-_slipping, _lost_in = _code.compiled(stick_slip.slipping), _code.compiled(motion.lost_in)
-_slipping_at = _code.compiled(stick_slip.slipping_at, friction_at=_friction_at)
-_solve_step = _code.compiled(
-    substeps.solve_step,
-    decide_at_rest=_decide_at_rest,
-    holds_through=_holds_through,
-    may_switch_within=_may_switch_within,
-    friction_over=_code.compiled(substeps.friction_over, friction_at=_friction_at, moved=_moved),
-    at_rest=_code.compiled(substeps.at_rest),
-    moved=_moved,
-    numbers=_same,
-    note=_note,
-    count_of=_count_of,
-    drop_last=_drop_last,
-    is_full=_is_full,
-)
-
-
-@_code.compiled
-def _follow(of, mode, table, forced, states, comps, held, at_ends, loads, ends, begin):  # pragma: no cover
+def _follow(of, mode, held, forced, course, loads, ends, begin, y, comp, z, after, moved):  # pragma: no cover
     """Follows a mode from a step on; returns the first step in which it does not hold. See ``motion.follow``."""
-    size, friction = states.shape[1], _slipping(of, mode)
-    y, comp, moved, z = states[begin].copy(), comps[begin].copy(), np.empty(size), states[begin].copy()
-    if begin:
-        for j in range(size):
-            y[j] = z[j] - forced[begin, j]
-            comp[j] = comp[j] + _lost_in(z[j], -forced[begin, j], y[j])
+    size, friction, k = len(y), slipping(of, mode), int(mode.is_stuck)
+    for j in range(size):
+        z[j] = y[j] = course[begin, j]
+        comp[j] = course[begin, size + j]
+        if begin:
+            y[j] = z[j] - forced[k, begin, j]
+            comp[j] = comp[j] + _lost_in(z[j], -forced[k, begin, j], y[j])
     first = 0
     for end in ends:
         at, first = max(first, begin), end
         for step in range(at, end):
-            command, load, end_load = held[step, 0], loads[step], loads[step + 1]
-            moved[:] = 0.0
-            for i in range(size):
-                for j in range(size):
-                    moved[j] += table[i, step - at, j] * y[i]
-            after = np.empty(size)
+            command, load, end_load = course[step, 2 * size], loads[step], loads[step + 1]
+            table, response, row = held[k, step - at], forced[k, step + 1], course[step + 1]
             for j in range(size):
-                total = moved[j] + table[size, step - at, j] * command + table[size + 1, step - at, j] * friction
-                moved[j] = total + comp[j]
-                change = moved[j] + forced[step + 1, j]
-                states[step + 1, j] = after[j] = y[j] + change
-                comps[step + 1, j] = change - (after[j] - y[j])
-            if not _holds_through(of, mode, after, command, end_load):
+                total = 0.0
+                for i in range(size):
+                    total += table[j, i] * y[i]
+                moved[j] = total + table[j, size] * command + table[j, size + 1] * friction + comp[j]
+                change = moved[j] + response[j]
+                after[j] = row[j] = y[j] + change
+                row[size + j] = change - (after[j] - y[j])
+            if not holds_through(of, mode, after, command, end_load):
                 return step
-            if mode.is_stuck and not _holds_through(of, mode, z, command, load):
+            if mode.is_stuck and not holds_through(of, mode, z, command, load):
                 return step
-            if _may_switch_within(of, mode, z, after, command, load, end_load, friction, 1.0):
+            if may_switch_within(of, mode, z, after, command, load, end_load, friction, 1.0):
                 return step
-            held[step, 2] = at_ends[step, 0] = friction
-            held[step, 3] = at_ends[step, 1] = mode.is_stuck
-            z = after
+            course[step, 2 * size + 2], course[step, 2 * size + 3] = friction, k
+            course[step, 2 * size + 4], course[step, 2 * size + 5] = friction, k
+            for j in range(size):
+                z[j] = after[j]
         if at < end:
             for j in range(size):
                 before = y[j]
                 y[j] = before + moved[j]
                 comp[j] = moved[j] - (y[j] - before)
-    return len(held)
+    return len(loads) - 1
+
+
+@_code.compiled
+def _walk(
+    of, halving, whole_steps, tables, held, forced, course, loads, ends, first_step, mode, pieces, room
+):  # pragma: no cover
+    """Moves one member through an interval; returns its mode at the end."""
+    step, n, size = 0, len(loads) - 1, forced.shape[2]
+    z, comp, next_z, next_comp, moved = room[0], room[1], room[2], room[3], room[4]
+    while step < n:
+        if whole_steps:
+            mode = decide_at_rest(of, mode, course[step], course[step, 2 * size], loads[step])
+            step = _follow(of, mode, held, forced, course, loads, ends, step, z, comp, next_z, next_comp, moved)
+        if step < n:
+            for j in range(size):
+                z[j], comp[j] = course[step, j], course[step, size + j]
+            made = solve_step(
+                of, halving, tables, mode, first_step + step, z, comp, course[step, 2 * size], loads[step],
+                loads[step + 1] - loads[step], pieces, next_z, next_comp,
+            )  # fmt: skip
+            mode = made.mode
+            for j in range(size):
+                course[step + 1, j], course[step + 1, size + j] = z[j], comp[j]
+            course[step, 2 * size + 2], course[step, 2 * size + 3] = made.friction, made.is_stuck
+            course[step, 2 * size + 4], course[step, 2 * size + 5] = (
+                slipping_at(of, mode, z[of.v]),
+                mode.is_stuck,
+            )
+            step += 1
+    return mode
+
+
+@_code.compiled
+def _row(rows, at):  # pragma: no cover
+    of = rows[at]
+    return Row((of[0], of[1], of[2], of[3], of[4], of[5], of[6], of[7]), of[8], of[9])
 
 
 @_code.compiled
 def _advance(
-    count, numbers, factors, coarsest, finest, whole_steps, tables, tables_held, forced, interval, loads, ends,
-    first_step, is_stuck, direction, pieces, upto, member,
-):  # pragma: no cover  # fmt: skip
+    numbers, rows, whole, tables, held, free, clamped, loads, ends, first_step, courses, modes, pieces, upto, member
+):  # pragma: no cover
     """Moves members through an interval, from one on; returns the first one whose pieces there is no room for."""
-    members, n, halving = len(is_stuck), len(interval.held), substeps.Halving(coarsest, finest)
+    members, n, size = courses.shape[2], courses.shape[0] - 1, tables.shape[2]
     law = stick_slip.Friction(numbers[0], numbers[1], numbers[2], numbers[3])
-    force, change = Row(factors[0], numbers[6], numbers[7]), Row(factors[1], numbers[8], numbers[9])
-    of = StickSlip(law, count, numbers[4], numbers[5], force, change)
-    for m in range(member, members):
-        before = pieces.noted[0]
-        states, comps = interval.states[:, :, m].copy(), interval.comps[:, :, m].copy()
-        held, at_ends = interval.held[:, :, m].copy(), interval.at_ends[:, :, m].copy()
-        load = loads[:, min(m, loads.shape[1] - 1)].copy()
-        free, clamped = forced[0], forced[1]
-        place = min(m, free.shape[2] - 1)
-        free, clamped = free[:, :, place].copy(), clamped[:, :, place].copy()
-        mode, step = StickSlipState(is_stuck[m], direction[m]), 0
-        while step < n:
-            if whole_steps:
-                mode = _decide_at_rest(of, mode, states[step], held[step, 0], load[step])
-                table, of_load = tables_held[int(mode.is_stuck)], clamped if mode.is_stuck else free
-                step = _follow(of, mode, table, of_load, states, comps, held, at_ends, load, ends, step)
-            if step < n:
-                rise, command = load[step + 1] - load[step], held[step, 0]
-                made = _solve_step(
-                    of, halving, tables, mode, first_step + step, states[step], comps[step], command, load[step], rise,
-                    pieces,
-                )  # fmt: skip
-                mode, states[step + 1], comps[step + 1] = made.mode, made.z, made.z_comp
-                held[step, 2], held[step, 3] = made.friction, made.is_stuck
-                at_ends[step, 0] = _slipping_at(of, mode, states[step + 1, of.v])
-                at_ends[step, 1] = mode.is_stuck
-                step += 1
-        if pieces.noted[0] > len(pieces.rows):
-            pieces.noted[0] = before
-            return m
-        interval.states[:, :, m], interval.comps[:, :, m] = states, comps
-        interval.held[:, :, m], interval.at_ends[:, :, m] = held, at_ends
-        is_stuck[m], direction[m], upto[m] = mode.is_stuck, mode.direction, pieces.noted[0]
-    return members
+    of = StickSlip(law, whole[0], numbers[4], numbers[5], _row(rows, 0), _row(rows, 1))
+    halving, room = substeps.Halving(whole[1], whole[2]), np.empty((5, size))
+    some, load, forced = (
+        np.empty((_TOGETHER, n + 1, 2 * size + 6)),
+        np.empty((_TOGETHER, n + 1)),
+        np.empty((2, n + 1, size)),
+    )
+    while member < members:
+        many, done = min(_TOGETHER, members - member), 0
+        for step in range(n + 1):
+            for at in range(many):
+                some[at, step, 2 * size] = courses[step, 2 * size, member + at]
+                load[at, step] = loads[step, min(member + at, loads.shape[1] - 1)]
+        for j in range(2 * size):
+            for at in range(many):
+                some[at, 0, j] = courses[0, j, member + at]
+        for at in range(many):
+            m, before = member + at, pieces[-1, 0]
+            if free.shape[2] > 1 or not at:
+                place = min(m, free.shape[2] - 1)
+                forced[0], forced[1] = free[:, :, place], clamped[:, :, place]
+            mode = StickSlipState(modes[0, m] > 0.0, modes[1, m])
+            mode = _walk(
+                of,
+                halving,
+                whole[3] > 0,
+                tables,
+                held,
+                forced,
+                some[at],
+                load[at],
+                ends,
+                first_step,
+                mode,
+                pieces,
+                room,
+            )
+            if pieces[-1, 0] >= len(pieces):
+                pieces[-1, 0] = before
+                break
+            modes[0, m], modes[1, m], upto[m], done = mode.is_stuck, mode.direction, int(pieces[-1, 0]), done + 1
+        for step in range(n + 1):
+            for j in range(2 * size + 6):
+                if not (2 * size <= j < 2 * size + 2):
+                    for at in range(done):
+                        courses[step, j, member + at] = some[at, step, j]
+        member += done
+        if done < many:
+            break
+    return member
 
 
 class Loops:
@@ -205,47 +179,53 @@ class Loops:
     def __init__(
         self, of: StickSlip, halving: substeps.Halving, whole_steps: bool, tables: np.ndarray, held: np.ndarray
     ) -> None:
-        size = tables.shape[-1]
-        # What numba need not look into at every call is made of arrays there.
-        numbers = np.array([*of.law, of.mass_kg, of.speed_up, *of.force[1:], *of.change[1:]])
-        factors = np.stack([_dense(row, size) for row in (of.force, of.change)])
-        self._system = of.v, numbers, factors, *halving, whole_steps, tables, held
-        self._pieces = Pieces(np.empty((_PIECES, 6 + size + of.v)), np.zeros(1, np.int64))
+        numbers, rows = np.array([*of.law, of.mass_kg, of.speed_up]), np.zeros((2, STATES + 2))
+        for row, (of_states, *others) in zip(rows, (of.force, of.change), strict=True):
+            row[-2:] = others
+            for i, factor in of_states:
+                row[i] = factor
+        of_each_state = np.ascontiguousarray(tables.swapaxes(2, 3)), np.ascontiguousarray(held.transpose(0, 2, 3, 1))
+        self._system = numbers, rows, np.array([of.v, *halving, whole_steps]), *of_each_state
+        self._pieces = np.empty((_PIECES + 1, 6 + tables.shape[-1] + of.v))
+        self._ends = dict[tuple[int, ...], np.ndarray]()
 
     def advance(
-        self, interval: Interval, forced: tuple[np.ndarray, np.ndarray], loads: np.ndarray, holds: list[Hold],
-        first_step: int, is_stuck: np.ndarray, direction: np.ndarray,
+        self, course: np.ndarray, forced: tuple[np.ndarray, np.ndarray], loads: np.ndarray, holds: list[Hold],
+        first_step: int, modes: np.ndarray,
     ) -> list[tuple[int, np.ndarray]] | None:  # fmt: skip
         """Moves all members through an interval, whose first plant step is numbered; changes their modes in place.
+
+        Args:
+            course: of an ``Interval``, shape (n + 1, columns, members); all but the start and what the line holds is
+                filled in.
+            forced: responses to the loads while body 0 slips and while it sticks, shape (n + 1, states, 1 or members).
+            loads: shape (n + 1, 1 or members), N.
+            modes: whether body 0 sticks, and its direction, shape (2, members).
 
         Returns:
             (member, rows of its pieces) of those that have any; None where one switches too often for the loops: the
             interval is then to be moved by other means.
         """
-        ends, upto = np.array([*accumulate([hold[0] for hold in holds])]), np.empty(len(is_stuck), np.int64)
-        found, pieces, begun, loads = list[tuple[int, np.ndarray]](), self._pieces, 0, np.ascontiguousarray(loads)
-        while begun < len(is_stuck):
-            pieces.noted[0] = 0
+        counts = tuple([hold[0] for hold in holds])
+        if counts not in self._ends:
+            self._ends[counts] = np.cumsum(counts)
+        found, pieces, begun, members = list[tuple[int, np.ndarray]](), self._pieces, 0, course.shape[2]
+        upto = np.empty(members, np.int64)
+        while begun < members:
+            pieces[-1, 0] = 0.0
             member = _advance(
-                *self._system, forced, interval, loads, ends, first_step, is_stuck, direction, pieces, upto, begun
-            )  # fmt: skip
+                *self._system, *forced, loads, self._ends[counts], first_step, course, modes, pieces, upto, begun
+            )
             if member == begun:
                 return None
-            if count := int(pieces.noted[0]):
-                rows, first = pieces.rows[:count].copy(), 0
+            if count := int(pieces[-1, 0]):
+                rows, first = pieces[:count].copy(), 0
                 for place, end in enumerate(upto[begun:member].tolist(), begun):
                     if end > first:
                         found.append((place, rows[first:end]))
                         first = end
             begun = member
         return found
-
-
-def _dense(row: Row, size: int) -> np.ndarray:
-    factors = np.zeros(size)
-    for i, factor in row.of_states:
-        factors[i] = factor
-    return factors
 
 
 def try_out() -> None:
@@ -257,6 +237,5 @@ def _try_out() -> None:
     row = Row([], 1.0, 1.0)
     of = StickSlip(stick_slip.Friction(1.0, 1.0, 0.0, 1.0), 1, 1.0, 1.0, row, row)
     loops = Loops(of, substeps.Halving(0, 1), True, np.zeros((2, 3, 6, 2)), np.zeros((2, 4, 1, 2)))
-    interval = Interval(*(np.zeros(shape) for shape in ((2, 2, 1), (2, 2, 1), (1, 4, 1), (1, 2, 1))))
     forced = np.zeros((2, 2, 1)), np.zeros((2, 2, 1))
-    loops.advance(interval, forced, np.zeros((2, 1)), [(1, 0.0, 0)], 0, np.zeros(1, bool), np.ones(1))
+    loops.advance(np.zeros((2, 10, 1)), forced, np.zeros((2, 1)), [(1, 0.0, 0)], 0, np.ones((2, 1)))

@@ -96,16 +96,14 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         forced: tuple[np.ndarray, np.ndarray], tick: int, holds: list[Hold],
     ) -> StickSlipState | None:  # fmt: skip
         """Fills in the interval by loops of machine code; returns the mode at its end, None where they cannot."""
-        is_stuck, direction = np.array([mode.is_stuck]), np.array([mode.direction])
-        one = Interval(*(part[..., None] for part in interval))
-        free, clamped = forced
-        pieces = loops.advance(
-            one, (free[..., None], clamped[..., None]), loads[:, None], holds, tick * self._n, is_stuck, direction
-        )
+        modes, (free, clamped) = np.array([[mode.is_stuck], [mode.direction]]), forced
+        of_one = interval.course[..., None], (free[..., None], clamped[..., None]), loads[:, None]
+        pieces = loops.advance(*of_one, holds, tick * self._n, modes)
         if pieces is None:
             return None
         self._pieces += [rows for _, rows in pieces]
-        return StickSlipState(bool(is_stuck[0]), float(direction[0]))
+        is_stuck, direction = modes.ravel().tolist()
+        return StickSlipState(is_stuck > 0.0, direction)
 
     def _follow(
         self, mode: StickSlipState, interval: Interval, begin: int, holds: list[Hold], loads: np.ndarray,
@@ -133,13 +131,15 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         self, mode: StickSlipState, interval: Interval, step: int, tick: int, loads: np.ndarray
     ) -> StickSlipState:
         """Fills in one step, whatever happens in it; returns the mode at its end."""
-        states, comps, held, at_ends = interval
+        _, states, comps, held, at_ends = interval
         load, rise = float(loads[step]), float(loads[step + 1] - loads[step])
         number, command = tick * self._n + step, float(held[step, 0])
-        mode, states[step + 1], comps[step + 1], held[step, 2], held[step, 3] = solve_step(
-            self._stick_slip, self._halving, self._tables, mode, number, states[step], comps[step], command, load, rise,
-            self._pieces,
+        z, z_comp, *room = np.stack([states[step], comps[step]] * 2)
+        mode, held[step, 2], held[step, 3] = solve_step(
+            self._stick_slip, self._halving, self._tables, mode, number, z, z_comp, command, load, rise, self._pieces,
+            *room,
         )  # fmt: skip
+        states[step + 1], comps[step + 1] = z, z_comp
         at_ends[step] = slipping_at(self._stick_slip, mode, states[step + 1, self._v]), mode.is_stuck
         return mode
 
@@ -182,11 +182,11 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         interval, loads = self._begin(holds), self.loads(tick * self._n, (tick + 1) * self._n + 1)
         forced = self._free.of_interval(tick), self._clamped.of_interval(tick)
         if self._loops and (mode := self.state.mode):
-            modes = mode.is_stuck.copy(), mode.direction.copy()
-            found = self._loops.advance(interval, forced, loads, holds, tick * self._n, *modes)
+            modes = np.stack([mode.is_stuck, mode.direction])
+            found = self._loops.advance(interval.course, forced, loads, holds, tick * self._n, modes)
             if found is not None:
                 self._pieces += found
-                return self._accept(tick, interval, StickSlipState(*modes))
+                return self._accept(tick, interval, StickSlipState(modes[0] > 0.0, modes[1]))
         is_stuck, direction = self._decided(interval, loads)
         lasts = np.empty(is_stuck.shape, bool)
         for kind in (False, True):
@@ -199,9 +199,6 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
             of_this = tree_member((loads, forced), place)
             is_stuck[place], direction[place] = self._solve(interval, place, tick, tree_member(holds, place), *of_this)
         return self._accept(tick, interval, StickSlipState(is_stuck, direction))
-
-    def _begin(self, holds: list[Hold]) -> Interval:
-        return super()._begin(holds)._replace(at_ends=np.zeros((self._n, 2, *self.state.z.shape[1:])))
 
     def _decided(self, interval: Interval, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Returns the modes at the beginning; see ``decide_at_rest``."""

@@ -9,7 +9,14 @@ import numpy as np
 
 from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.history import StickSlipState
-from haploop.plant.friction.stick_slip import StickSlip, decide_at_rest, friction_at, holds_through, may_switch_within
+from haploop.plant.friction.stick_slip import (
+    Row,
+    StickSlip,
+    decide_at_rest,
+    friction_at,
+    holds_against,
+    may_switch_within,
+)
 from haploop.protocol.scene.scene import Scene
 
 # A piece is halved this often to find when friction switches: to 2e-14 s at 10 kHz.
@@ -32,40 +39,72 @@ class Step(NamedTuple):
     """Course of a plant step in which body 0 may stick and slip.
 
     Attributes:
-        mode, z, z_comp: at the end; what rounding left of the states z.
+        mode: at the end.
         friction, is_stuck: friction in N, and whether body 0 was stuck, at the start.
     """
 
     mode: StickSlipState
-    z: np.ndarray
-    z_comp: np.ndarray
     friction: float
     is_stuck: bool
 
 
-# What follows is computed as it stands, or by machine code, where these few functions are loops over arrays.
+# What follows is computed as it stands, or by machine code, where these few functions are loops over arrays. A place
+# among the tables is (whether body 0 is stuck, level); states come with what rounding left of them.
 
 Pieces = list[list[float]]
+Place = tuple[int, int]
 numbers = np.ndarray.tolist
 
 
 def moved(
-    table: np.ndarray, z: np.ndarray, z_comp: np.ndarray, command: float, friction: float, load: float, rise: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Returns states and what rounding left of them by the transition of a table."""
-    acting = np.append(z, (command, friction, load, rise))
-    change = np.add.reduce(table * acting[:, None]) + z_comp
-    after = z + change
-    return after, change - (after - z)
+    tables: Any, of: Place, z: list[float], z_comp: list[float], command: float, friction: float, load: float,
+    rise: float, after: np.ndarray, comp: np.ndarray,
+) -> None:  # fmt: skip
+    """Fills in states by a transition."""
+    table = tables[of[0]][of[1]]
+    change = np.add.reduce(table * np.array((*z, command, friction, load, rise))[:, None]) + z_comp
+    np.add(z, change, out=after)
+    np.subtract(change, after - z, out=comp)
+
+
+def one_moved(
+    tables: Any, of: Place, at: int, z: list[float], z_comp: list[float], command: float, friction: float, load: float,
+    rise: float,
+) -> float:  # fmt: skip
+    """Returns one of the states that ``moved`` fills in, to the same bits."""
+    total = 0.0
+    for factor, acts in zip(tables[of[0]][of[1]][:, at].tolist(), (*z, command, friction, load, rise), strict=True):
+        total += factor * acts
+    return z[at] + (total + z_comp[at])
+
+
+def force_moved(
+    row: Row, tables: Any, of: Place, z: list[float], z_comp: list[float], command: float, friction: float, load: float,
+    rise: float, end_load: float,
+) -> float:  # fmt: skip
+    """Returns the value of a linear form after a transition; see ``row_on``."""
+    force = row.of_command * command + row.of_load * end_load
+    for i, factor in row.of_states:
+        force = force + factor * one_moved(tables, of, i, z, z_comp, command, friction, load, rise)
+    return force
+
+
+def take_over(z: np.ndarray, z_comp: np.ndarray, next_z: np.ndarray, next_comp: np.ndarray) -> None:
+    z[:], z_comp[:] = next_z, next_comp
+
+
+def read(values: list[float], z: np.ndarray) -> None:
+    """Reads the numbers of an array anew."""
+    values[:] = z.tolist()
 
 
 def count_of(pieces: Pieces) -> int:
     return len(pieces)
 
 
-def note(pieces: Pieces, of: StickSlip, head: tuple[float, ...], begin: list[float], comp: np.ndarray) -> None:
+def note(pieces: Pieces, of: StickSlip, head: tuple[float, ...], begin: list[float], comp: list[float]) -> None:
     """Notes a piece: a row of ``pieces_record``."""
-    pieces.append([*head, *begin, *comp[: of.v].tolist()])
+    pieces.append([*head, *begin, *comp[: of.v]])
 
 
 def drop_last(pieces: Pieces) -> None:
@@ -84,7 +123,7 @@ def is_full(pieces: Pieces, first: int, step: int) -> bool:
 
 def solve_step(
     of: StickSlip, halving: Halving, tables: Any, mode: StickSlipState, step: int, z: np.ndarray, z_comp: np.ndarray,
-    command: float, load: float, rise: float, pieces: Any,
+    command: float, load: float, rise: float, pieces: Any, next_z: np.ndarray, next_comp: np.ndarray,
 ) -> Step:  # fmt: skip
     """Solves plant step number ``step`` in which body 0 may stick and slip, under a command and a load, N.
 
@@ -92,11 +131,14 @@ def solve_step(
     within it, the piece is halved, until the switch lies within h / 2^32; there the mode changes, and v is set to
     exactly 0.0. The kinetic energy which that throws away, of the order of 1e-20 of what moves, is heat of friction.
     With a Stribeck velocity every piece has the friction of the speed foreseen for its middle: second order in h.
+    Whether the mode holds at the end of a piece few states tell, so that only a piece that is kept is moved as a whole.
 
     Args:
         tables: transitions over h / 2^level by whether body 0 is stuck and by level.
+        z, z_comp: states, and what rounding left of them, from the start of the step to its end.
         rise: of the load over the step, N.
         pieces: takes the pieces of the step, none where it is one piece.
+        next_z, next_comp: room for states on the way.
 
     Raises:
         ArithmeticError: friction switched so often that it took a million pieces.
@@ -106,32 +148,36 @@ def solve_step(
     whole = left = 1 << halving.finest
     level, hunted_to = halving.coarsest, -1
     begun_with, was_stuck = 0.0, mode.is_stuck
+    begin, comp, end = numbers(z), numbers(z_comp), numbers(next_z)
     while left:
         while 1 << (halving.finest - level) > left:
             level += 1
         rest = left - (1 << (halving.finest - level))
         load_now, load_then = load + rise * (1.0 - left / whole), load + rise * (1.0 - rest / whole)
-        table = tables[int(mode.is_stuck)]
-        friction = friction_over(of, mode, table[level + 1], z, z_comp, command, load_now, rise)
-        next_z, next_comp = moved(table[level], z, z_comp, command, friction, load_now, rise)
-        begin, end = numbers(z), numbers(next_z)
-        holds = holds_through(of, mode, end, command, load_then) or not math.isfinite(end[of.v])
-        if level < halving.finest:
-            if not holds:
-                level, hunted_to = level + 1, rest if hunted_to < 0 else hunted_to
-                continue
-            if may_switch_within(of, mode, begin, end, command, load_now, load_then, friction, 0.5**level):
-                level += 1
-                continue
+        piece = int(mode.is_stuck), level
+        friction = friction_over(of, mode, tables, level + 1, begin, comp, command, load_now, rise)
+        holds = holds_after(of, mode, tables, piece, begin, comp, command, friction, load_now, rise, load_then)
+        if not holds and level < halving.finest:
+            level, hunted_to = level + 1, rest if hunted_to < 0 else hunted_to
+            continue
+        moved(tables, piece, begin, comp, command, friction, load_now, rise, next_z, next_comp)
+        read(end, next_z)
+        if level < halving.finest and may_switch_within(
+            of, mode, begin, end, command, load_now, load_then, friction, 1.0 / (1 << level)
+        ):
+            level += 1
+            continue
         if left == whole:
             begun_with, was_stuck = friction, mode.is_stuck
-        snap_J, begun = 0.0, z_comp
-        stuck_in_it = mode.is_stuck
-        left, z, z_comp = rest, next_z, next_comp
+        stuck_in_it, snap_J = mode.is_stuck, 0.0
         if not holds:
-            z, z_comp, snap_J = at_rest(of, z, z_comp)
-            mode = decide_at_rest(of, mode, z, command, load_then)
-        note(pieces, of, (step, level, stuck_in_it, friction, load_now, snap_J), begin, begun)
+            snap_J = at_rest(of, next_z, next_comp)
+            mode = decide_at_rest(of, mode, next_z, command, load_then)
+        note(pieces, of, (step, level, stuck_in_it, friction, load_now, snap_J), begin, comp)
+        left = rest
+        take_over(z, z_comp, next_z, next_comp)
+        read(begin, z)
+        read(comp, z_comp)
         if not holds or left <= hunted_to:
             level, hunted_to = halving.coarsest, -1
         elif hunted_to >= 0:
@@ -140,30 +186,42 @@ def solve_step(
             break
     if count_of(pieces) == first + 1:
         drop_last(pieces)
-    return Step(mode, z, z_comp, begun_with, was_stuck)
+    return Step(mode, begun_with, was_stuck)
 
 
 def friction_over(
-    of: StickSlip, mode: StickSlipState, half: np.ndarray, z: np.ndarray, z_comp: np.ndarray, command: float,
-    load: float, rise: float,
+    of: StickSlip, mode: StickSlipState, tables: Any, half: int, z: Any, z_comp: Any, command: float, load: float,
+    rise: float,
 ) -> float:  # fmt: skip
-    """Returns the friction force in a piece, N; ``half`` is the transition over half of it."""
+    """Returns the friction force in a piece, N; ``half`` is the level of half of it."""
     if mode.is_stuck:
         return 0.0
-    v, direction = float(z[of.v]), mode.direction
+    v, direction = z[of.v], mode.direction
     if of.law.stribeck_m_s != 0.0:
         begun = -direction * friction_at(of.law, v)
-        v = float(moved(half, z, z_comp, command, begun, load, rise)[0][of.v])
+        v = one_moved(tables, (0, half), of.v, z, z_comp, command, begun, load, rise)
     return -direction * friction_at(of.law, v)
 
 
-def at_rest(of: StickSlip, z: np.ndarray, z_comp: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Returns states with body 0 at rest and all others as they move, and the energy in J that it lost."""
-    z, z_comp, v = z.copy(), z_comp.copy(), float(z[of.v])
+def holds_after(
+    of: StickSlip, mode: StickSlipState, tables: Any, piece: Place, z: Any, z_comp: Any, command: float,
+    friction: float, load: float, rise: float, end_load: float,
+) -> bool:  # fmt: skip
+    """Tells whether the mode still holds at the end of a piece, or v is no finite number, as ``holds_through``."""
+    v = one_moved(tables, piece, of.v, z, z_comp, command, friction, load, rise)
+    if not mode.is_stuck:
+        return mode.direction * v > 0.0 or not math.isfinite(v)
+    force = force_moved(of.force, tables, piece, z, z_comp, command, friction, load, rise, end_load)
+    return holds_against(of.law, force) or not math.isfinite(v)
+
+
+def at_rest(of: StickSlip, z: np.ndarray, z_comp: np.ndarray) -> float:
+    """Puts body 0 at rest and leaves all others as they move; returns the energy in J that it lost."""
+    v = float(z[of.v])
     if of.v > 1:
         z[of.v + 1] += v
     z[of.v] = z_comp[of.v] = 0.0
-    return z, z_comp, 0.5 * of.mass_kg * v * v
+    return 0.5 * of.mass_kg * v * v
 
 
 def pieces_record(chain: Chain, pieces: list[Any]) -> dict[str, np.ndarray]:
