@@ -17,7 +17,7 @@ from haploop.protocol.trees import tree_leaves, tree_select, tree_unflatten
 Loads = Callable[[int, int], np.ndarray]
 _wide = np.longdouble
 # Responses to the load are made for this many intervals at a time, on a fixed grid; in a batch for fewer.
-_PIECE_TICKS, _PIECE_TICKS_OF_A_BATCH = 256, 8
+PIECE_TICKS, _PIECE_TICKS_OF_A_BATCH = 256, 8
 
 
 class ChainTransition:
@@ -70,7 +70,10 @@ def scaled_rates(chain: Chain, step_s: float, stuck: bool) -> Matrix:
 
 
 class ChainResponse:
-    """Transitions, and the forced (zero-state) response to the load alone, of intervals of so many steps: a cache."""
+    """Transitions, and the forced (zero-state) response to the load alone, of intervals of so many steps: a cache.
+
+    ``of_piece`` returns the responses of a piece of so many intervals, each as ``of_interval`` does.
+    """
 
     def __init__(
         self, chain: Chain, step_s: float, steps: int, loads: Loads, *, stuck: bool, has_members: bool
@@ -81,13 +84,13 @@ class ChainResponse:
 
         self.step, self.held = make_tables(made, chain, has_members=has_members)
         self._loads, self._n = loads, steps
-        self._piece_ticks = _PIECE_TICKS_OF_A_BATCH if has_members else _PIECE_TICKS
-        self._piece = lru_cache(maxsize=1)(self._made)
+        self._piece_ticks = _PIECE_TICKS_OF_A_BATCH if has_members else PIECE_TICKS
+        self.of_piece = lru_cache(maxsize=1)(self._made)
 
     def of_interval(self, tick: int) -> np.ndarray:
         """Returns the response at the steps of interval ``tick`` and at its end, shape (n + 1, states)."""
         piece, at = divmod(tick, self._piece_ticks)
-        return self._piece(piece)[at]
+        return self.of_piece(piece)[at]
 
     def _made(self, piece: int) -> np.ndarray:
         n, table = self._n, self.step
@@ -106,7 +109,7 @@ class ChainResponse:
 
     def select(self, kept: np.ndarray) -> None:
         self.step, self.held = tree_select((self.step, self.held), kept)
-        self._piece.cache_clear()
+        self.of_piece.cache_clear()
 
 
 class ChainIntegrals:

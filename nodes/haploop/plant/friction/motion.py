@@ -8,7 +8,7 @@ import numpy as np
 
 from haploop.plant.chain.history import ChainState, Interval, StickSlipState
 from haploop.plant.chain.motion import ChainMotion, follow
-from haploop.plant.chain.transition import ChainTransition
+from haploop.plant.chain.transition import PIECE_TICKS, ChainTransition
 from haploop.plant.friction.stick_slip import (
     RubbingHistory,
     StickSlip,
@@ -49,6 +49,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         super().__init__(scene, time)
         self._clamped = self._response(stuck=True)
         self._pieces: list[Any] = []
+        self._piece, self._ahead = -1, list[np.ndarray]()
         self._halving, self._whole_steps = halving_of(self.chain, self._step_s), goes_by_whole_steps(scene)
         levels = self._halving.finest + 1
         self._tables = [
@@ -64,20 +65,20 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         return module.Loops(self._stick_slip, self._halving, self._whole_steps, np.stack(self._tables), held)
 
     def advance(self, tick: int, holds: list[Hold]) -> Any:
+        if self._loops and (found := self._by_loops(self._loops, tick, holds)):
+            return self._accept(tick, *found)
         loads = self.loads(tick * self._n, (tick + 1) * self._n + 1)
-        return self.advance_under(loads, self.forced(tick), tick, holds)
+        return self.advance_under(loads, self._forced(tick), tick, holds)
 
-    def forced(self, tick: int) -> tuple[np.ndarray, np.ndarray]:
+    def _forced(self, tick: int) -> tuple[np.ndarray, np.ndarray]:
         """Returns the forced response of interval ``tick`` while the first body slips, and while it is stuck."""
         return self._free.of_interval(tick), self._clamped.of_interval(tick)
 
     def advance_under(
         self, loads: np.ndarray, forced: tuple[np.ndarray, np.ndarray], tick: int, holds: list[Hold]
     ) -> Any:
-        """Moves through an interval as ``advance`` does, under given loads, shape (n + 1,), and their responses."""
+        """Moves through an interval by NumPy, under given loads, shape (n + 1,), and their responses."""
         interval, mode = self._begin(holds), self.state.mode
-        if self._loops and mode and (found := self._by_loops(self._loops, interval, mode, loads, forced, tick, holds)):
-            return self._accept(tick, interval, found)
         step = 0
         assert mode
         while step < self._n:
@@ -91,19 +92,25 @@ class FrictionMotion(RubbingHistory, ChainMotion):
                 step += 1
         return self._accept(tick, interval, mode)
 
-    def _by_loops(
-        self, loops: Loops, interval: Interval, mode: StickSlipState, loads: np.ndarray,
-        forced: tuple[np.ndarray, np.ndarray], tick: int, holds: list[Hold],
-    ) -> StickSlipState | None:  # fmt: skip
-        """Fills in the interval by loops of machine code; returns the mode at its end, None where they cannot."""
-        modes, (free, clamped) = np.array([[mode.is_stuck], [mode.direction]]), forced
-        of_one = interval.course[..., None], (free[..., None], clamped[..., None]), loads[:, None]
-        pieces = loops.advance(*of_one, holds, tick * self._n, modes)
+    def _by_loops(self, loops: Loops, tick: int, holds: list[Hold]) -> tuple[Interval, StickSlipState] | None:
+        """Returns the interval by loops of machine code, and the mode at its end; None where they cannot."""
+        interval, mode, n, (piece, at) = self._begin(holds), self.state.mode, self._n, divmod(tick, PIECE_TICKS)
+        assert mode
+        if piece != self._piece:
+            first = piece * PIECE_TICKS * n
+            loads = self.loads(first, first + PIECE_TICKS * n + 1)
+            self._piece, self._ahead = (
+                piece,
+                [of[..., None] for of in (self._free.of_piece(piece), self._clamped.of_piece(piece), loads)],
+            )
+        free, clamped, loads = self._ahead
+        of_this = (free[at], clamped[at]), loads[at * n : (at + 1) * n + 1]
+        modes = np.array(((mode.is_stuck,), (mode.direction,)), float)
+        pieces = loops.advance(interval.course[..., None], *of_this, holds, tick * n, modes)
         if pieces is None:
             return None
         self._pieces += [rows for _, rows in pieces]
-        is_stuck, direction = modes.ravel().tolist()
-        return StickSlipState(is_stuck > 0.0, direction)
+        return interval, StickSlipState(modes.item(0) > 0.0, modes.item(1))
 
     def _follow(
         self, mode: StickSlipState, interval: Interval, begin: int, holds: list[Hold], loads: np.ndarray,
