@@ -16,6 +16,8 @@ from helpers.scenes.varied_scenes import drawn_base, varied
 
 # Of the largest excursion of each loop.
 TOLERANCE = 1e-11
+# Of the first 40, so that every estimator, element, hand force, limit of an actuator and kind of change comes twice.
+SEEDS = [3, 6, 8, 13, 18, 22, 23, 26, 31, 33, 36, 37, 38]
 
 
 def loops_of(scenes: list[Scene], by_program: bool) -> Batch:
@@ -81,7 +83,7 @@ def check_motion(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(0, 40, 3))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_drawn_loops_move_as_in_arrays(seed: int) -> None:
     """Noise, estimators, actuators, changes while the loop runs."""
     check_motion(seed)
