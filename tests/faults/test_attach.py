@@ -11,7 +11,7 @@ from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.replay import ReplayError, replay
 from haploop.launch.scene.file import load
-from helpers.live.launched import SCENE, alive, first_and_slowly
+from helpers.live.launched import SCENE, alive, first_and_slowly, wait_for
 
 KINDS = registry()
 # It stands still at tick 500, so that it is surely still there when something joins it.
@@ -85,11 +85,17 @@ def test_a_logger_that_joins_in_mid_run_logs_the_same_numbers_from_its_first_tic
 
 
 @pytest.mark.slow
-def test_a_logger_can_join_a_run_that_stands_still(running, attached, alone):
+def test_a_logger_can_join_a_run_that_stands_still_and_misses_nothing_though_it_is_stopped_as_the_run_ends(
+    running, attached, alone
+):
     run = running(sets=(*SHORT, NEVER))
     run.reaches(500)
     second = attached(run)
+    run.stands(at=run.ask("step", ticks=1500)["tick"])
+    second.signal(signal.SIGSTOP)
     run.ask("resume")
+    wait_for("more than its processes would wait for by themselves", lambda: second.stood_for(1.5))
+    second.signal(signal.SIGCONT)
     assert run.summary()["trajectory_sha256"] == alone
     second.end(0)
     assert assert_same_from_its_first_tick_on(run.log(), haploop.logger.read(second.out)) == 500

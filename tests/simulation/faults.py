@@ -121,7 +121,7 @@ class Slow(Fault):
         return 600 * self.seconds
 
     def silences(self, role: str) -> float:
-        return 20 * self.seconds if role == self.role else 0.0
+        return 8 * self.seconds if role == self.role else 0.0
 
     def happen(self, sim: Sim) -> None:
         sim.process(self.role).slow_s = self.seconds

@@ -97,7 +97,7 @@ def _when(dice: Random) -> When:
 
 
 def _fate(dice: Random) -> tuple[str, float]:
-    return dice.choice(("stays", "stays", "leaves", "killed", "stopped")), dice.expovariate(20.0)
+    return dice.choice(("stays", "stays", "leaves", "killed", "stopped", "held")), dice.expovariate(20.0)
 
 
 def _fault(dice: Random) -> Fault:
@@ -169,7 +169,7 @@ _KINDS: dict[Callable[[Random], Fault], int] = {
     lambda dice: Kill(_when(dice), dice.choice(OWN)): 3,
     lambda dice: KillLauncher(_when(dice)): 1,
     lambda dice: Stop(_when(dice), dice.choice(ALL), dice.choice((0.05, 0.5, 3.0, 8.0))): 3,
-    lambda dice: Slow(_when(dice), dice.choice(ALL), dice.choice((1e-4, 1e-3, 5e-3))): 3,
+    lambda dice: Slow(_when(dice), dice.choice(ALL), dice.choice((1e-4, 1e-3, 5e-3, 0.1))): 3,
     lambda dice: Late(_when(dice), dice.choice(ALL), dice.choice((1e-3, 0.02, 0.2)), dice.random()): 3,
     lambda dice: LateStart(When(-1, 0.0), dice.choice(OWN), dice.uniform(0.0, 10.0)): 2,
     lambda dice: DiskFull(_when(dice), dice.choice((0, dice.randint(0, 30_000)))): 1,

@@ -42,7 +42,7 @@ class Sim:
         owners: who was given the directory.
         heard: (observer, events) of those that took part to the end.
         shown: (viewer, outcome) likewise.
-        second_logs: directory and summary of second loggers that ended in order.
+        second_logs: directory and summary of second loggers that ended in order, and whether each was owed all of it.
         killed_at, stopped_at: role -> time at which its process was killed, or last stopped.
         may_fail: whether anything has happened that may end the run.
     """
@@ -54,7 +54,7 @@ class Sim:
         self.owners: list[str] = []
         self.heard: list[tuple[str, list[tuple[int, Event]]]] = []
         self.shown: list[tuple[str, str]] = []
-        self.second_logs: list[tuple[Path, dict[str, Any]]] = []
+        self.second_logs: list[tuple[Path, dict[str, Any], bool]] = []
         self.world = World(plan.seed, plan.jumpiness, plan.latency_s)
         self.watch = Watch(self.scene.run.window_blocks * self.scene.run.block_ticks)
         self.run = SimRun(self.world, self.watch, Disk(), dict(plan.starts_s))
@@ -212,7 +212,10 @@ class Sim:
         else:
             events, reads_log = self.watch.events, True
         log = self.out / "log.mcap" if reads_log and self.scene.run.log != "none" else None
-        for out, of_second in self.second_logs:
+        for out, of_second, is_owed_all in self.second_logs:
+            reached = of_second["from_tick"] + of_second["ticks"]
+            if summary and is_owed_all and (reached, of_second["ended"]) != (summary["ticks"], summary["ended"]):
+                return f"a second logger that kept up has {reached} of {summary['ticks']} ticks, {of_second['ended']}"
             if summary and (broken := second_difference(self.plan.scene, events, of_second, out / "log.mcap")):
                 return broken
         if taken := broken_kept(self.out):

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simulation.defects import DEFECTS, put_back, seeds_needed
-from simulation.faults import Kill, LateStart, Stop, When
+from simulation.faults import Kill, LateStart, Slow, Stop, When
 from simulation.plan import Plan, draw, fewest, shrink, tell
 from simulation.play import play
 from simulation.plugins import BROKEN, HANGS, SOUND, Reload
@@ -20,7 +20,8 @@ _STARTS_S = {"plant": 0.1, "controller": 0.2, "logger": 0.3}
 _CALM = Plan(0, "wall", 0.0, 1e-4, math.inf, _STARTS_S, ())
 _STAYS = ("stays", 0.0)
 # Histories that once broke a promise: nodes waited for, and a run ended, by the deadline of a loop that runs; a clock
-# that asked the time without end while nodes loaded; an impostor's refusal told as the reason of a death.
+# that asked the time without end while nodes loaded; an impostor's refusal told as the reason of a death; nodes that
+# left before a second logger had what they had published.
 _RECORDED = {
     "a controller that takes 9 s to start, in a scene whose deadline is 2 s": (
         LateStart(When(-1, 0.0), "controller", 9.0),
@@ -33,6 +34,9 @@ _RECORDED = {
     "false joins of a stranger, and a death": (
         Stranger(When(-1, 0.1), _STAYS, "clock", 600, 452),
         Kill(When(-1, 0.25), "logger"),
+    ),
+    "a second logger that is stopped as the run ends, for less than its deadline": (
+        SecondLogger(When(1, 0.0), ("held", 0.016)),
     ),
     "a second logger that joins as the run ends": (SecondLogger(When(69, 0.0), _STAYS),),
 }
@@ -61,6 +65,12 @@ def test_two_thousand_seeds_keep_every_promise(part: int) -> None:
 @pytest.mark.parametrize("what", _RECORDED)
 def test_a_history_that_broke_a_promise_once_keeps_it(what: str, pace: float) -> None:
     assert play(replace(_CALM, faults=_RECORDED[what], pace=pace)).broken == ""
+
+
+def test_where_every_exchange_of_a_block_takes_long_the_plant_is_not_taken_for_hung() -> None:
+    """A block of 16 ticks takes longer than the deadline of 2 s, and nobody has anything to report meanwhile."""
+    outcome = play(replace(_CALM, scene="least", faults=(Slow(When(40, 0.0), "plant", 0.18),)))
+    assert (outcome.broken, outcome.how) == ("", "in order")
 
 
 def test_a_seed_gives_the_same_history_again() -> None:

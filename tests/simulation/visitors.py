@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from simulation.sim import Sim
 
 _LOOK_S = 0.2
+_STOPPED_S = {"stopped": 5.0, "held": 1.3}
 _PYTHONS_WORDS = re.compile(r"\b[A-Z]\w*(Error|Exception)\b")
 _NO_PID = 2**22 + 1
 _JUNK = [*junk(), *out_of_place(), *false_joins(), *(encode("PROGRESS", tick, {}) for tick in range(0, 70, 5))]
@@ -57,7 +58,7 @@ class Live(LiveRun):
 class Visit(Fault):
     """A process of its own that comes to the run; ``fate`` (what, after how many seconds) may befall it there.
 
-    Fates: ``stays``, ``leaves``, ``killed``, ``stopped`` (for 5 s, longer than the run's deadline).
+    Fates: ``stays``, ``leaves``, ``killed``, ``stopped`` for 5 s, longer than the run's deadline, ``held`` for less.
     """
 
     fate: tuple[str, float]
@@ -75,8 +76,8 @@ class Visit(Fault):
         what, after_s = self.fate
         if what == "killed":
             sim.world.after(after_s, process.kill)
-        elif what == "stopped":
-            sim.world.after(after_s, process.stop, 5.0)
+        elif what in _STOPPED_S:
+            sim.world.after(after_s, process.stop, _STOPPED_S[what])
 
     def time_to_leave(self, sim: Sim) -> Callable[[], bool]:
         leaves_at = sim.world.now + self.fate[1] if self.fate[0] == "leaves" else float("inf")
@@ -190,13 +191,14 @@ class SecondLogger(Visit):
                 node.start(client.join({}), out)
                 tick, summary = node.run()
                 client.leave("LEAVE", tick)
-                sim.second_logs.append((out, summary))
+                is_owed_all = process in sim.watch.followed and self.fate[0] != "stopped" and not leave()
+                sim.second_logs.append((out, summary, is_owed_all))
                 return
             except Refused:
                 process.sleep(_LOOK_S)
             except (Aborted, TelemetryGap) as error:
                 node.save(str(error))
-                if not leave() and not process.stopped_s and not sim.may_fail and sim.run.launcher.alive:
+                if not leave() and self.fate[0] != "stopped" and not sim.may_fail and sim.run.launcher.alive:
                     sim.watch.fail(f"a second logger that kept up was sent away: {error}")
                 return
             finally:

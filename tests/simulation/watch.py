@@ -47,6 +47,7 @@ class Watch:
         broken: the first promise that was broken, or "".
         granted: the greatest tick granted.
         lossless: processes that may miss nothing.
+        followed: those whose READY the clock has read before any of the run's own was done.
         reported: tick of each of them as the clock has read it, while it takes part.
         reports: (time, tick) of every report of the logger.
         events: (tick, event) as granted.
@@ -59,6 +60,8 @@ class Watch:
         self.granted, self._last = 0, False
         self.reported: dict[Process, int] = {}
         self.lossless: set[Process] = set()
+        self.followed: set[Process] = set()
+        self._done: set[Process] = set()
         self._told: dict[bytes, int] = {}
         self._owed: defaultdict[Pipe, int] = defaultdict(int)
         self._next: dict[SimSocket, int] = {}
@@ -172,6 +175,10 @@ class Watch:
     def _clock_hears(self, pipe: Pipe, name: str, data: bytes) -> None:
         process = pipe.near.process
         is_own = self._is_own(process)
+        if is_own and name == "DONE":
+            self._done.add(process)
+        elif name == "READY" and process in self.lossless and not self._done:
+            self.followed.add(process)
         if process in self.lossless:
             if name in ("READY", "PROGRESS"):
                 self.reported[process] = max(self.reported.get(process, 0), ints(data, 1)[0])

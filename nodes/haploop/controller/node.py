@@ -87,6 +87,7 @@ class ControllerNode:
             except ElementError:
                 self._flush()
                 raise
+            client.keep_in_touch(end, "plant")
             tick, held = end, end - self._reported
             if held >= self._block.ticks or (end >= client.until and self._block.is_worth_it(held)):
                 self._flush()

@@ -123,12 +123,12 @@ class LoggerNode:
             idle = not poller.poll(REPORT_MS)
             if not self._client.until:  # the run has not begun
                 self.session.logger.count_wall_time()
-            if idle:
+            if idle or self._client.is_quiet:  # blocks of one alone bring no tick further
                 self._client.waiting(self._tick, self._awaited)
             self._drain()
             self._client.poll()
             self._note_events()
-            if (why := self._leave()) is not None:
+            if (why := self._leave()) is not None and (idle or not why):  # what still comes is taken first
                 return self.finish(why)
             if self._carried_out:
                 self._report_refusals(self._carried_out)

@@ -58,7 +58,7 @@ class PlantNode:
         while plant.stop_reason is None and not (client.last and plant.tick >= client.until):
             for tick, event in client.take_events():
                 plant.schedule(tick, event)
-            plant.run_until(min(self._flushed + self._block.ticks, client.until), self._loop.exchange)
+            plant.run_until(min(self._flushed + self._block.ticks, client.until), self._exchange)
             if self._block.is_worth_it(plant.reached - self._flushed):
                 self._flush()
             else:
@@ -71,6 +71,11 @@ class PlantNode:
                 elif not client.hears(int(HELD_S * 1000)):
                     self._flush()
         return self._end()
+
+    def _exchange(self, tick: int, samples: list[tuple[float, ...]]) -> list[float]:
+        forces = self._loop.exchange(tick, samples)
+        self._client.keep_in_touch(tick, "controller")  # where every answer takes its time, a block takes long
+        return forces
 
     def _end(self) -> tuple[int, Message]:
         plant = self._plant

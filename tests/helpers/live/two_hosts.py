@@ -117,8 +117,8 @@ def two_hosts(delay_s: float = 0.0, loss: float = 0.0) -> Iterator[Wire]:
             inside = ("-n", _name(host))
             _ip(*inside, "addr", "add", f"{own}/24", "dev", device)
             _ip(*inside, "addr", "add", f"{own6}/64", "dev", device, "nodad")
-            for name in (device, "lo"):
-                _ip(*inside, "link", "set", name, "up")
+            for name in (device, "lo"):  # a queue that holds a whole window of telemetry, or it would lose packets, too
+                _ip(*inside, "link", "set", name, "txqueuelen", "20000", "up")
         is_by_netem = shutil.which("tc") is not None and all(_shape(host, delay_s, loss) for host in "ab")
         wire = Wire((ends[0], ends[1]), delay_s, loss, is_by_netem)
         try:

@@ -134,6 +134,11 @@ class SimChild:
     def wait(self, timeout_s: float) -> bool:
         return self._launcher.wait(self.readable, timeout_s)
 
+    def let_go(self) -> None:
+        self._launcher.check()
+        self._run.let_go.add(self.role)
+        self.process.nudge()
+
     def rouse(self) -> None:
         """No element hangs here: a signal by which one would be given up finds nothing to do."""
 
@@ -144,11 +149,25 @@ class SimChild:
         self.process.kill()
 
 
+@dataclass
+class _Life:
+    """What keeps a process that is done, with the methods of ``node.LineOfLife``."""
+
+    run: SimRun
+    role: str
+
+    def loosen(self) -> None:
+        """A line ends no simulated process."""
+
+    def wait(self) -> None:
+        self.run.nodes[self.role].wait(lambda: self.role in self.run.let_go, None)
+
+
 class SimRun:
     """The launcher of one run and what it starts.
 
     Attributes:
-        nodes: process by role, once started.
+        nodes: process by role, once started; those in ``let_go`` may end when they are done.
         received: signals that the launcher was sent.
         starts_s: what each takes to start, by role.
         named_at: when the launcher first ended a process, or found that all had ended.
@@ -157,6 +176,7 @@ class SimRun:
     def __init__(self, world: World, watch: Any, disk: Disk, starts_s: dict[str, float]) -> None:
         self.world, self.watch, self.disk, self.starts_s = world, watch, disk, starts_s
         self.nodes: dict[str, Process] = {}
+        self.let_go: set[str] = set()
         self.received: list[int] = []
         self.clock = self.secret = ""
         self.named_at: float | None = None
@@ -192,7 +212,9 @@ class SimRun:
     def _node(self, role: str, sockets: Path, start: dict[str, Any]) -> Callable[[], int]:
         work = import_module(PROCESSES[role].module).work
         disk = self.disk if role == "logger" else None
-        return lambda: take_part(self.context(self.nodes[role], disk), role, work, start, sockets)
+        return lambda: take_part(
+            self.context(self.nodes[role], disk), role, work, start, sockets, life=_Life(self, role)
+        )
 
     @contextlib.contextmanager
     def interrupts(self, usual_from: int) -> Iterator[list[int]]:

@@ -57,14 +57,22 @@ class Lane:
         for _ in range(len(self.flying)):
             self._launch()
 
+    @property
+    def due(self) -> float:
+        """When the last of it arrives: a process that is stopped takes nothing."""
+        return max(self.last, self.to.process.stopped_until) if self.flying and self.to is not None else self.last
+
     def _arrive(self) -> None:
+        if self.to is not None and self._world.now < self.to.process.stopped_until:
+            self._world.at(self.to.process.stopped_until, self._arrive)
+            return
         if self.flying and self.to is not None:
             self.to.take(self._pipe, self, self.flying.popleft())
 
     def cut(self, linger_s: float) -> None:
         """Ends it: without linger, some of what is on its way, the latest, is lost."""
         world = self._world
-        if self.to is None or linger_s <= 0.0 or self.last > world.now + linger_s:
+        if self.to is None or linger_s <= 0.0 or self.due > world.now + linger_s:
             for _ in range(world.dice.randint(0, len(self.flying))):
                 self.flying.pop()
 
@@ -111,7 +119,7 @@ class Pipe:
             if linger_s > 0.0:
                 self._world.after(linger_s, self._hang_up, end)
         else:
-            self._world.at(away.last, self._hang_up, end)
+            self._world.at(away.due, self._hang_up, end)
 
     def _hang_up(self, end: Any) -> None:
         other = self.far if end is self.near else self.near

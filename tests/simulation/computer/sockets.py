@@ -112,7 +112,7 @@ class SimSocket:
 
     def last_word(self) -> float:
         """Returns when the last of what was sent arrives."""
-        return max((pipe.lane_from(self).last for pipe in self.pipes.values()), default=0.0)
+        return max((pipe.lane_from(self).due for pipe in self.pipes.values()), default=0.0)
 
     # Receiving
 

@@ -19,7 +19,7 @@ class Node:
     Attributes:
         role, pid, lossless: as it said when it joined; a lossless node holds the clock back.
         tick: every tick before it is done.
-        joined, heard: wall time of its JOIN and of its last message, s.
+        joined, heard, moved: wall time of its JOIN, of its last message, and of its last that told of more ticks, s.
         is_gone: whether a message could not be sent to it, since its connection has ended.
         program: name, version and command of what it is, as it said; each a text that may be missing.
     """
@@ -39,7 +39,12 @@ class Node:
     status: Message = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.joined = self.heard
+        self.joined = self.moved = self.heard
+
+    def reached(self, tick: int) -> None:
+        """Takes note that it has done every tick before this one."""
+        if tick > self.tick:
+            self.tick, self.moved = tick, self.heard
 
     @property
     def is_own(self) -> bool:
@@ -125,6 +130,10 @@ class Roster:
         """The tick of the slowest lossless node but plant and controller; it bounds what is in flight."""
         return min((node.tick for node in self.nodes.values() if node.lossless and not node.done), default=0)
 
+    def followers(self) -> list[Node]:
+        """Returns the observers that may miss nothing and have begun to follow."""
+        return [node for node in self.nodes.values() if not node.is_own and node.lossless and node.ready]
+
     def loop_tick(self) -> int | None:
         """Returns the tick up to which a pace takes the loop as done: the plant's; None before it has joined.
 
@@ -149,6 +158,7 @@ class Roster:
         for node in self.nodes.values():
             node.heard += seconds
             node.joined += seconds
+            node.moved += seconds
 
     def table(self) -> list[Message]:
         """Returns role, pid, tick, lag behind the first, whom it waits for and skipped ticks of every node.

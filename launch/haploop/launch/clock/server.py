@@ -219,7 +219,7 @@ class ClockServer:
             self._send(node.identity, "GRANT", self._clock.until, self._clock.is_last, self._clock.events_from(tick))
 
     def _on_progress(self, node: Node, tick: int, status: Message) -> None:
-        node.tick = max(node.tick, tick)
+        node.reached(tick)
         node.status = {key: told for key, told in status.items() if key not in REFUSALS} or node.status
         if node.role == "plant":
             self._clock.pace.done(tick, node.heard)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.spec import RunFailed
@@ -12,14 +10,18 @@ from haploop.launch.spec import RunFailed
 START_DEADLINE_S = 20.0
 
 _WITHOUT_YOU = "the run goes on without you."
+_ENDS_WITHOUT_YOU = "what is left is kept for you no longer."
 
 
-def late_observers(roster: Roster, now: float, deadline_s: float) -> list[tuple[Node, str]]:
+def late_observers(
+    roster: Roster, now: float, deadline_s: float, ended_at: float | None = None
+) -> list[tuple[Node, str]]:
     """Returns the observers that hold a run back and are silent, or not ready for too long, each with a sentence.
 
     Args:
         now: wall time, s.
-        deadline_s: how long one may be silent, s.
+        deadline_s: how long one may be silent, s, or take nothing of a run that has ended.
+        ended_at: wall time at which it did, s; None while it goes on.
     """
     late = []
     for node in roster.nodes.values():
@@ -27,15 +29,11 @@ def late_observers(roster: Roster, now: float, deadline_s: float) -> list[tuple[
             continue
         if now - node.heard > deadline_s and node.tick <= roster.slowest():
             late.append((node, f"Nothing was heard of you for {deadline_s:g} s; {_WITHOUT_YOU}"))
+        elif ended_at is not None and now - max(node.moved, ended_at) > deadline_s:
+            late.append((node, f"You took nothing for {deadline_s:g} s after the end; {_ENDS_WITHOUT_YOU}"))
         elif not node.ready and now - node.joined > START_DEADLINE_S:
             late.append((node, f"You were not ready within {START_DEADLINE_S:g} s; {_WITHOUT_YOU}"))
     return late
-
-
-def busy() -> str:
-    """Returns a sentence on a machine with far more to do than it can, which may be why a node is silent; else ""."""
-    load, cores = os.getloadavg()[0], os.cpu_count() or 1
-    return f" The machine was busy: load average {load:.0f} on {cores} cores." if load > 3 * cores else ""
 
 
 class Standstill:

@@ -18,14 +18,13 @@ from haploop.controller.dissipation.registry import installed
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.commands import Commands
 from haploop.launch.clock.device_time import PLANT, lateness_told
-from haploop.launch.clock.roster import Node
 from haploop.launch.clock.server import ClockServer
 from haploop.launch.processes import open_files, private_directory, run_directory
 from haploop.launch.processes.awaited import Awaited
 from haploop.launch.processes.children import Child, interrupts, start_children
+from haploop.launch.processes.deadlines import LAST_WORDS_S, Deadlines
 from haploop.launch.processes.foreign import Program
 from haploop.launch.processes.shown_prints import PRINTS, ShownPrints
-from haploop.launch.processes.standstill import START_DEADLINE_S, Standstill, busy, late_observers
 from haploop.launch.spec import OutputError, RunFailed, RunSpec
 from haploop.protocol.changes import Event
 from haploop.protocol.ticks import Timebase
@@ -42,14 +41,8 @@ Start = Callable[[Path, Callable[[str], Message], bool, int, Mapping[str, Progra
 
 # What the logger is given to save its files after another node has failed.
 _SAVING_S = 0.7
-# How long the last message of a process that has exited may still be on its way.
-_LAST_WORDS_S = 1.0
 # Between looks at nodes that say nothing; commands, reports and deaths are noticed at once.
 _LOOK_MS = 100
-# Attached nodes that say nothing are asked this often whether they are still there.
-_PROBE_S = 0.2
-# When the launcher itself was held up for longer (stopped, swapped out, loading a plugin), nobody is blamed for it.
-_HELD_UP_S = 1.0
 
 
 def run_processes(
@@ -102,7 +95,6 @@ class Supervisor:
         scene = spec.scene
         timebase = Timebase.from_scene(scene)
         self._clock = Clock(scene, timebase, spec.kinds, spec.pace, in_leaps=spec.clock == PLANT)
-        self._deadline_s = scene.run.deadline
         self._context, self._machine = context, machine_of(context)
         secret = secrets.token_hex(16)
         told = {
@@ -137,13 +129,13 @@ class Supervisor:
         self._start_nodes = partial(start_nodes, sockets, told_to, scene.run.pin, run_number, spec.programs)
         self._external = [program for program in spec.programs.values() if program.is_external]
         self._children: dict[str, Child] = {} if self._external else self._start_nodes()
-        self._started = self._looked = self._machine.now()
-        self._standstill = Standstill(self._server.roster, self._clock, self._deadline_s)
+        self._deadlines = self._watch()
         if not math.isinf(spec.pace):  # the nodes are loading
             self._clock.prepare()
-        self._probe_due = 0.0
         self._stopping = False
-        self._roused: dict[tuple[str, float], float] = {}  # role and when it was last heard of -> when it was roused
+
+    def _watch(self) -> Deadlines:
+        return Deadlines(self._spec, self._clock, self._server, self._children, self._machine)
 
     def run(self) -> Summary:
         failed = True
@@ -155,7 +147,7 @@ class Supervisor:
                 awaited = Awaited(self._sockets, self._external, self._server, self._machine)
                 awaited.wait(self._told_to, self._spec.wait_s, self._interrupts)
                 self._children = self._start_nodes()
-                self._started = self._looked = self._machine.now()
+                self._deadlines = self._watch()
             self._lead()
             failed = False
             summary = self._server.results["logger"]
@@ -182,6 +174,7 @@ class Supervisor:
         poller.register(self._server.socket, zmq.POLLIN)
         for child in self._children.values():
             poller.register(child.died, zmq.POLLIN)
+        self._held = set(self._children)
         while not self._server.roster.all_own("done"):
             wait_s = self._clock.wait_s(self._machine.now())
             ready = self._machine.wait(poller, _LOOK_MS / 1000 if wait_s is None else min(wait_s, _LOOK_MS / 1000))
@@ -191,74 +184,47 @@ class Supervisor:
                 if child.died in ready:
                     self._look_at(child)
                     poller.unregister(child.died)
-            self._check_deadlines()
+            self._deadlines.check()
             self._prints.look(self._machine.now())
             if logger := self._server.roster.own("logger"):
                 self._spec.on_progress(logger.status)
+            if self._server.results:
+                self._let_go()
+        self._see_off()
         for child in self._children.values():
             child.wait(self._spec.transport.linger_s + 1.0)
+
+    def _let_go(self) -> None:
+        """Lets every process end that is done, unless somebody still follows who may miss nothing."""
+        if not self._server.roster.followers():
+            for role in self._server.results.keys() & self._held:
+                self._held.remove(role)
+                self._children[role].let_go()
+
+    def _see_off(self) -> None:
+        """Keeps what was published until all who may miss nothing have it; a signal, or their deadline, ends that."""
+        signals, ended_at = len(self._interrupts), self._machine.now()
+        while self._server.roster.followers() and len(self._interrupts) == signals:
+            self._server.socket.poll(_LOOK_MS)
+            self._server.serve()
+            self._deadlines.check_observers(ended_at)
+        for role in self._held:
+            self._children[role].let_go()
 
     def _look_at(self, child: Child) -> None:
         """Takes note that a process has ended: in order after DONE, otherwise the run fails."""
         ended = child.exit_description()
-        given_up = self._machine.now() + (_LAST_WORDS_S if child.exited() else 0.0)
+        given_up = self._machine.now() + (LAST_WORDS_S if child.exited() else 0.0)
         self._server.serve()
         while not ((node := self._server.roster.own(child.role)) and node.done):
             if self._machine.now() > given_up:
                 # Whoever was killed was not turned away: such a JOIN was somebody else's.
                 refused = self._server.roster.refused.get(child.role) if not node and child.exited() else None
-                raise RunFailed(f"The {self._server.roster.label(child.role)} {ended}; {refused or self._where()}")
+                raise RunFailed(
+                    f"The {self._server.roster.label(child.role)} {ended}; {refused or self._deadlines.where()}"
+                )
             self._server.socket.poll(20)
             self._server.serve()
-
-    def _check_deadlines(self) -> None:
-        now, roster = self._machine.now(), self._server.roster
-        held_up_s, self._looked = now - self._looked, now
-        if held_up_s > _HELD_UP_S:
-            self._started += held_up_s
-            self._standstill.discount(held_up_s)
-            roster.discount_silence(held_up_s)
-        if not roster.joined():
-            if now - self._started > START_DEADLINE_S:
-                missing = [role for role in self._children if not roster.own(role)]
-                names = " and the ".join(map(roster.label, missing))
-                refused = [roster.refused[role] for role in missing if role in roster.refused]
-                raise RunFailed(" ".join([f"The {names} did not join within {START_DEADLINE_S:g} s.", *refused]))
-            return
-        for node in roster.nodes.values():
-            if node.is_gone and roster.is_external(node.role) and not node.done:
-                raise RunFailed(f"The {roster.label(node.role)} is gone; {self._where()}")
-        if self._spec.programs:
-            self._standstill.check(now)
-        # Nodes may still load and a machine be busy with it; the deadline of the scene is that of a loop that runs.
-        deadline_s = self._deadline_s if roster.common_tick() else max(self._deadline_s, START_DEADLINE_S)
-        for node in roster.silent(now, self._deadline_s):
-            if node.is_own and now - node.heard > deadline_s and not self._may_rouse(node, now):
-                ended = "given up" if roster.is_external(node.role) else "ended"
-                raise RunFailed(
-                    f"The {roster.label(node.role)} has not answered for {deadline_s:g} s and was {ended}; "
-                    f"{self._where()}{busy()} A longer wait can be set with run.deadline."
-                )
-        for node, why in late_observers(roster, now, self._deadline_s):
-            self._server.drop(node, why)
-        if now >= self._probe_due:
-            self._probe_due = now + _PROBE_S
-            self._server.probe(roster.silent(now, _PROBE_S))
-
-    def _may_rouse(self, node: Node, now: float) -> bool:
-        """Rouses a controller that hangs, once; tells whether a last word of it may still come."""
-        if node.role != "controller" or node.role in self._spec.programs:
-            return False
-        silence = (node.role, node.heard)
-        if silence not in self._roused:
-            self._roused[silence] = now
-            self._children[node.role].rouse()
-        return now - self._roused[silence] < _LAST_WORDS_S
-
-    def _where(self) -> str:
-        tick = self._server.roster.common_tick()
-        rate = self._spec.scene.clock.control_rate
-        return f"the last tick all nodes had done is {tick} ({tick / rate:g} s)."
 
     def _heed_signals(self) -> None:
         if len(self._interrupts) > 1:

@@ -9,6 +9,7 @@ import zmq
 
 from haploop.protocol.changes import Event
 from haploop.protocol.transport.connection import Connection
+from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.sockets import (
     SecureContext,
@@ -63,6 +64,7 @@ class ClockClient:
         self._grace_s = 0.0 if role in PROCESSES else _GRACE_S
         self._lost = _LOST.format(address.removeprefix("tcp://"), transport.patience_s)
         connect(self.socket, address)
+        self._now, self._due = machine_of(context).now, 0.0
         self.until = 0
         self.last = False
         self.events: list[tuple[int, Event]] = []
@@ -103,6 +105,7 @@ class ClockClient:
     def _say(self, name: str, *fields: Any) -> None:
         """Sends a message, once there is room; where the connection does not stand, it is lost, and others tell why."""
         frame = encode(name, *fields)
+        self._due = self._now() + REPORT_MS / 1000
         if not send_at_once(self.socket, frame) and not (self._connection and self._connection.is_down()):
             self.socket.send(frame)
 
@@ -155,6 +158,17 @@ class ClockClient:
     def waiting(self, tick: int, on: str) -> None:
         """Reports that this node is alive and waits for the process ``on``."""
         self._say("WAITING", tick, on)
+
+    @property
+    def is_quiet(self) -> bool:
+        """True where nothing has been said for 0.2 s."""
+        return self._now() >= self._due
+
+    def keep_in_touch(self, tick: int, on: str) -> None:
+        """Reports WAITING, and takes what the clock has sent, where a node at work has been quiet."""
+        if self.is_quiet:
+            self.waiting(tick, on)
+            self.poll()
 
     def ended(self, tick: int, reason: str) -> None:
         """Reports that the plant ended the run by itself."""

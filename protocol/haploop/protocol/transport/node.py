@@ -35,7 +35,8 @@ def run_node(role: str, work: Work) -> None:
     Stdin brings one line of JSON: address of the clock, secret and transport of the run, the file to which what is
     printed goes, and the cores to stay on, null for any.
 
-    It stays open as long as the launcher lives; at its end this process ends at once, whatever it is doing.
+    It stays open as long as the launcher lives; at its end this process ends at once, whatever it is doing. After DONE
+    one line more comes: those who may miss nothing have what was published, and this process may go.
     """
     directory = Path(sys.argv[1])
     line = sys.stdin.readline()
@@ -46,14 +47,40 @@ def run_node(role: str, work: Work) -> None:
     if start["cores"]:
         with contextlib.suppress(OSError):
             os.sched_setaffinity(0, start["cores"])
-    with contextlib.suppress(OSError):  # where compiled code lets no thread run, the kernel ends this process instead
-        fcntl.fcntl(0, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(0, fcntl.F_SETFL, fcntl.fcntl(0, fcntl.F_GETFL) | fcntl.FASYNC)
-    life, sys.stdin = sys.stdin, open(os.devnull)  # noqa: SIM115, PTH123 (code that asks for input gets none)
-    threading.Thread(target=_end_with_parent, args=(life,), daemon=True).start()
+    life = LineOfLife(sys.stdin)
+    sys.stdin = open(os.devnull)  # noqa: SIM115, PTH123 (code that asks for input gets none)
     gc.freeze()
     context = SecureContext.from_transport(Transport.from_dict(start["transport"]))
-    sys.exit(take_part(context, role, work, start, directory))
+    sys.exit(take_part(context, role, work, start, directory, life=life))
+
+
+class LineOfLife:
+    """A pipe from the launcher: this process ends with it at once, and waits at its own end for a line to go."""
+
+    def __init__(self, pipe: TextIO) -> None:
+        self._pipe, self._may_go = pipe, threading.Event()
+        with contextlib.suppress(OSError):  # where compiled code lets no thread run, the kernel ends this process
+            fcntl.fcntl(pipe, fcntl.F_SETOWN, os.getpid())
+            self._alarm(fcntl.FASYNC)
+        threading.Thread(target=self._heed, daemon=True).start()
+
+    def _alarm(self, flag: int) -> None:
+        fcntl.fcntl(self._pipe, fcntl.F_SETFL, (fcntl.fcntl(self._pipe, fcntl.F_GETFL) & ~fcntl.FASYNC) | flag)
+
+    def _heed(self) -> None:
+        if self._pipe.read(1):
+            self._may_go.set()
+            self._pipe.read()
+        os._exit(1)
+
+    def loosen(self) -> None:
+        """Lets the line come, which would end this process before its work is done."""
+        with contextlib.suppress(OSError):
+            self._alarm(0)
+
+    def wait(self) -> None:
+        """Waits for the line."""
+        self._may_go.wait()
 
 
 def take_part(
@@ -63,17 +90,23 @@ def take_part(
     start: Message,
     directory: Path,
     tell: Callable[[str], None] = lambda why: None,
+    life: LineOfLife | None = None,
 ) -> int:
     """Works, reports to the clock how that ended, ends the context, and returns the exit status: 0 after DONE, else 1.
 
     Args:
         start: address of the clock and secret of the run.
         tell: is told why it did not end with DONE.
+        life: by which the launcher, where there is one, keeps what is published here until it has been taken.
     """
     client = ClockClient(context, role, start["address"], start["secret"])
     try:
         tick, result = work(client, context, directory)
+        if life:
+            life.loosen()
         client.leave("DONE", tick, result)
+        if life:
+            life.wait()
         status = 0
     except Aborted as error:
         tell(str(error))
@@ -90,8 +123,3 @@ def take_part(
         status = 1
     context.destroy(linger=int(1000 * transport_of(context).linger_s))
     return status
-
-
-def _end_with_parent(life: TextIO) -> None:
-    life.read()
-    os._exit(1)

@@ -1,0 +1,108 @@
+"""Deadlines of nodes: of the run's own, whose silence ends it, and of observers, without whom it goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from haploop.launch.clock.clock import Clock
+from haploop.launch.clock.roster import Node, Roster
+from haploop.launch.clock.server import ClockServer
+from haploop.launch.processes.children import Child
+from haploop.launch.processes.standstill import START_DEADLINE_S, Standstill, late_observers
+from haploop.launch.processes.strain import NOBODY, Strain
+from haploop.launch.spec import RunFailed, RunSpec
+from haploop.protocol.transport.machine import Machine
+
+# How long the last message of a process that has exited may still be on its way.
+LAST_WORDS_S = 1.0
+# Attached nodes that say nothing are asked this often whether they are still there.
+_PROBE_S = 0.2
+# When the launcher itself was held up for longer (stopped, swapped out, loading a plugin), nobody is blamed for it.
+_HELD_UP_S = 1.0
+
+
+class Deadlines:
+    """Watches who is silent, from the start of the processes on.
+
+    Args:
+        children: the run's processes that the launcher has started, by role.
+    """
+
+    def __init__(
+        self, spec: RunSpec, clock: Clock, server: ClockServer, children: Mapping[str, Child], machine: Machine
+    ) -> None:
+        self._spec, self._server, self._children, self._machine = spec, server, children, machine
+        self._deadline_s = spec.scene.run.deadline
+        self._standstill = Standstill(server.roster, clock, self._deadline_s)
+        self._started = self._looked = machine.now()
+        self._probe_due = 0.0
+        self._roused: dict[tuple[str, float], float] = {}  # role and when it was last heard of -> when it was roused
+        self._strain = Strain()
+
+    def check(self) -> None:
+        """Raises RunFailed where one of the run's own has kept silent too long, or has done nothing."""
+        now, roster = self._look()
+        if not roster.joined():
+            if now - self._started > START_DEADLINE_S:
+                missing = [role for role in self._children if not roster.own(role)]
+                names = " and the ".join(map(roster.label, missing))
+                refused = [roster.refused[role] for role in missing if role in roster.refused]
+                raise RunFailed(" ".join([f"The {names} did not join within {START_DEADLINE_S:g} s.", *refused]))
+            return
+        for node in roster.nodes.values():
+            if node.is_gone and roster.is_external(node.role) and not node.done:
+                raise RunFailed(f"The {roster.label(node.role)} is gone; {self.where()}")
+        if self._spec.programs:
+            self._standstill.check(now)
+        # Nodes may still load and a machine be busy with it; the deadline of the scene is that of a loop that runs.
+        deadline_s = self._deadline_s if roster.common_tick() else max(self._deadline_s, START_DEADLINE_S)
+        for node in roster.silent(now, self._deadline_s / 2):
+            if not node.is_own:
+                continue
+            pid = self._children[node.role].pid if node.role in self._children else NOBODY
+            self._strain.note(pid, node.heard, now)
+            if now - node.heard > deadline_s and not self._may_rouse(node, now):
+                ended = "given up" if roster.is_external(node.role) else "ended"
+                raise RunFailed(
+                    f"The {roster.label(node.role)} has not answered for {deadline_s:g} s and was {ended}; "
+                    f"{self.where()}{self._strain.told(pid, now)} A longer wait can be set with run.deadline."
+                )
+        self._check_observers(now)
+
+    def _look(self) -> tuple[float, Roster]:
+        """Returns the wall time, s, and the roster, in which nobody is blamed for what held the launcher itself up."""
+        now, roster = self._machine.now(), self._server.roster
+        held_up_s, self._looked = now - self._looked, now
+        if held_up_s > _HELD_UP_S:
+            self._started += held_up_s
+            self._standstill.discount(held_up_s)
+            roster.discount_silence(held_up_s)
+        return now, roster
+
+    def check_observers(self, ended_at: float) -> None:
+        """Takes off observers for whom a run that has ended, at a wall time in s, would wait in vain."""
+        now, _ = self._look()
+        self._check_observers(now, ended_at)
+
+    def _check_observers(self, now: float, ended_at: float | None = None) -> None:
+        for node, why in late_observers(self._server.roster, now, self._deadline_s, ended_at):
+            self._server.drop(node, why)
+        if now >= self._probe_due:
+            self._probe_due = now + _PROBE_S
+            self._server.probe(self._server.roster.silent(now, _PROBE_S))
+
+    def _may_rouse(self, node: Node, now: float) -> bool:
+        """Rouses a controller that hangs, once; tells whether a last word of it may still come."""
+        if node.role != "controller" or node.role in self._spec.programs:
+            return False
+        silence = (node.role, node.heard)
+        if silence not in self._roused:
+            self._roused[silence] = now
+            self._children[node.role].rouse()
+        return now - self._roused[silence] < LAST_WORDS_S
+
+    def where(self) -> str:
+        """Returns how far all nodes had come, a sentence's end."""
+        tick = self._server.roster.common_tick()
+        rate = self._spec.scene.clock.control_rate
+        return f"the last tick all nodes had done is {tick} ({tick / rate:g} s)."

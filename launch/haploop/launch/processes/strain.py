@@ -1,0 +1,51 @@
+"""Strain on a machine, which may be why a process of it says nothing: what the system tells of a silent one."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+_STATES = {
+    "T": " It is stopped, by a signal or a debugger.",
+    "t": " It is stopped, by a signal or a debugger.",
+    "D": " It waits for a disk, or another device.",
+}
+_STARVED = " It was ready to go on, but got next to no processor time."
+_AT_WORK = " It was at work all the while."
+_BUSY = " The machine was busy: load average {:.0f} on {} cores."
+# A process that got less of a processor, as a share of the time, was kept waiting for it; one that got more worked.
+_LITTLE, _MUCH = 0.1, 0.5
+# In place of the pid of a process on another host.
+NOBODY = -1
+
+
+class Strain:
+    """What silent processes were doing, as far as the system tells it, which is where there is /proc."""
+
+    def __init__(self) -> None:
+        self._first: dict[int, tuple[float, float, float]] = {}
+
+    def note(self, pid: int, heard: float, now: float) -> None:
+        """Takes note of a process that is silent, at wall time ``now`` and last heard of at ``heard``, s."""
+        if self._first.get(pid, (0.0,))[0] != heard:
+            self._first[pid] = heard, now, _state(pid)[1]
+
+    def told(self, pid: int, now: float) -> str:
+        """Returns sentences on what may have kept one that was noted before from answering; "" for nothing."""
+        state, used_s = _state(pid)
+        _, since, used_then_s = self._first[pid]
+        share = (used_s - used_then_s) / max(now - since, 1e-3)
+        why = _STATES.get(state, "")
+        if state == "R":
+            why = _STARVED if share < _LITTLE else _AT_WORK if share > _MUCH else ""
+        load, cores = os.getloadavg()[0], os.cpu_count() or 1
+        return why + (_BUSY.format(load, cores) if load > 3 * cores else "")
+
+
+def _state(pid: int) -> tuple[str, float]:
+    """Returns the state of a process, a letter, and the processor time it has used, s; ("", 0) where none is told."""
+    try:
+        words = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+    except OSError:
+        return "", 0.0
+    return words[0], (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
