@@ -13,10 +13,17 @@ import zmq
 
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.run_directory import Elsewhere, RunNotFound, find
-from haploop.protocol.transport import clock_client
+from haploop.protocol.transport import clock_client, connection
 from haploop.protocol.transport.clock_client import ClockClient, Refused
 from haploop.protocol.transport.keys import CLIENT, CLOCK, make_keys, read_keys
 from haploop.protocol.transport.sockets import SecureContext, Transport, connect, open_socket
+
+
+@pytest.fixture
+def impatient(monkeypatch) -> None:
+    """What may pass is told after a second, not five; the sentences are the same."""
+    monkeypatch.setattr(connection, "_TOLD_AFTER_S", 0.6)
+    monkeypatch.setattr(connection, "_SILENCE_AFTER_S", 1.0)
 
 
 @pytest.fixture
@@ -85,8 +92,8 @@ def test_whoever_comes_with_keys_to_a_run_without_is_told_so(keys):
         assert "has no keys" in why(address, keys)
 
 
-@pytest.mark.slow  # what may pass is told after some seconds
-def test_the_keys_of_another_run_are_told_from_a_key_that_is_not_known(keys, tmp_path):
+@pytest.mark.slow  # what may pass is told after some time
+def test_the_keys_of_another_run_are_told_from_a_key_that_is_not_known(keys, tmp_path, impatient):
     make_keys(tmp_path / "other")
     with listening(keys) as address:
         assert "clock.key is not that of its keys" in why(address, tmp_path / "other")
@@ -98,7 +105,7 @@ def test_the_keys_of_another_run_are_told_from_a_key_that_is_not_known(keys, tmp
     ("says", "words"),
     [(b"HTTP/1.0 400\r\n\r\n", "is no run of haploop"), (b"", "says nothing"), (None, "Nobody listens")],
 )
-def test_what_is_no_run_at_all_is_told_so(keys, says, words, with_keys):
+def test_what_is_no_run_at_all_is_told_so(keys, says, words, with_keys, impatient):
     with socket.create_server(("127.0.0.1", 0)) as other:
         address = f"tcp://127.0.0.1:{other.getsockname()[1]}"
         if says is None:

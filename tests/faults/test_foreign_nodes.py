@@ -104,11 +104,11 @@ def test_a_run_so_short_that_nobody_waits_for_its_blocks_fails_where_they_are_mi
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize("numbers", [[signal.SIGKILL], [signal.SIGINT, signal.SIGINT]])
 def test_a_program_that_ignores_every_end_and_its_children_end_with_the_run(
-    number: signal.Signals, started: Started, tmp_path: Path
+    numbers: list[signal.Signals], started: Started, tmp_path: Path
 ) -> None:
-    """One of the children has a session of its own."""
+    """One of the children has a session of its own. The second interrupt ends at once, what never joined, too."""
     script = tmp_path / "stubborn.sh"
     script.write_text("trap '' TERM INT HUP\nsetsid sleep 977 &\nsleep 978\n")
     run = started(node=f"sh {script}", sets=())
@@ -117,9 +117,11 @@ def test_a_program_that_ignores_every_end_and_its_children_end_with_the_run(
         return [pid for pid, _, _, words in processes() if words in ("sleep 977", "sleep 978")]
 
     wait_for("both sleepers", lambda: len(asleep()) == 2)
-    run.signal(number)
+    for number in numbers:
+        run.signal(number)
+        wait_for("time to heed it", lambda: run.stood_for(0.3))
     wait_for("their end", lambda: not asleep())
-    run.end(-number if number == signal.SIGKILL else 1)
+    run.end(-signal.SIGKILL if numbers == [signal.SIGKILL] else 1)
 
 
 @pytest.mark.parametrize(

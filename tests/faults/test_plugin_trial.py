@@ -116,8 +116,16 @@ def test_a_unit_that_nobody_knows_is_refused_and_one_that_is_not_usual_is_not():
     assert "brake" in tried(source().replace("N s/m", "V s/inch"))
 
 
-@pytest.mark.parametrize("way", first_and_slowly([], ["--in-process"]))
-@pytest.mark.parametrize("statement", first_and_slowly("os._exit(0)", "sys.exit(0)", "raise KeyboardInterrupt", NEVER))
+@pytest.mark.parametrize(
+    ("statement", "way"),
+    first_and_slowly(
+        ("os._exit(0)", []),
+        ("os._exit(0)", ["--in-process"]),
+        ("sys.exit(0)", []),
+        ("raise KeyboardInterrupt", ["--in-process"]),
+        (NEVER, []),
+    ),
+)
 def test_a_file_that_ends_or_holds_its_process_is_a_sentence_at_launch_and_nothing_is_started(
     statement, way, scene, tmp_path
 ):

@@ -127,21 +127,21 @@ def test_a_network_that_is_cut_for_good_ends_the_run_on_both_sides_and_leaves_no
     "hosts", [FAR_AND_LOSSY, {"address": A6}, {"delay_s": 0.2}], indirect=True, ids=["lossy", "ipv6", "far"]
 )
 def test_a_run_is_steered_and_logged_from_another_host_and_keeps_its_bits(hosts, tmp_path):
-    run = hosts.run("--pace", "1", sets=("duration=60",))
+    run = hosts.run(sets=("duration=12", "event=[{at=0.5, pause=true}]"))
     wait_for("an answer", hosts.answers)
-    changed = hosts.command("set", "wall.stiffness=140", "--at", "59.5")
+    changed = hosts.command("set", "wall.stiffness=140", "--at", "11.5")
     assert (changed.returncode, changed.stderr) == (0, ""), changed.stderr
     logger = hosts.begin("b", *HAPLOOP, "attach", "logger", "--out", str(tmp_path / "attached"), *hosts.at)
     wait_for("its log", (tmp_path / "attached/log.mcap").exists)
-    assert hosts.command("pace", "free").returncode == 0
+    assert hosts.command("resume").returncode == 0
     summary = json.loads(run.communicate(timeout=4 * PATIENCE_S)[0])
     _, complaint = logger.communicate(timeout=PATIENCE_S)
     assert logger.returncode == 0, complaint
     attached = json.loads((tmp_path / "attached/summary.json").read_text())
-    assert (attached["from_tick"] + attached["ticks"], attached["ended"]) == (60000, "done")
+    assert (attached["from_tick"] + attached["ticks"], attached["ended"]) == (12000, "done")
     assert attached["final"] == summary["final"]
-    event = '[[event]]\nat = 59.5\nset = { "wall.stiffness" = 140.0 }'
-    assert summary["trajectory_sha256"] == bits_of("duration=60", directory=tmp_path, event=event)
+    event = '[[event]]\nat = 11.5\nset = { "wall.stiffness" = 140.0 }'
+    assert summary["trajectory_sha256"] == bits_of("duration=12", directory=tmp_path, event=event)
 
 
 def test_who_watches_from_another_host_is_told_that_the_network_was_cut_and_the_run_goes_on(hosts, tmp_path):
