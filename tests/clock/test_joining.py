@@ -1,6 +1,5 @@
 """The clock at its socket: who is let in, and what it does between two grants."""
 
-import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +12,7 @@ import zmq
 from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.clock.server import ClockServer
 from haploop.launch.processes.foreign import Program
-from haploop.launch.processes.standstill import busy, late_observers
+from haploop.launch.processes.standstill import late_observers
 from haploop.protocol.transport.messages import PROCESSES
 from helpers.live.attacks import Stranger, pack
 from helpers.runs.clocks import clock
@@ -150,11 +149,21 @@ def test_an_observer_that_holds_the_run_and_is_silent_or_never_ready_is_taken_of
     assert late_observers(roster, 30.0, 5.0) == []
 
 
-def test_a_machine_that_has_too_much_to_do_is_told_of_and_another_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "cpu_count", lambda: 2)
-    for load, said in ((6.0, ""), (20.2, " The machine was busy: load average 20 on 2 cores.")):
-        monkeypatch.setattr(os, "getloadavg", lambda load=load: (load, 0.0, 0.0))
-        assert busy() == said
+def test_of_a_run_that_has_ended_an_observer_is_kept_what_it_takes_but_not_what_it_only_speaks_of() -> None:
+    roster = Roster()
+    node = Node(b"1", "logger 2", 1, True, {}, 10.0, tick=50)
+    roster.nodes[node.identity] = node
+    assert roster.followers() == []
+    node.ready, node.heard = True, 22.0
+    node.reached(60)
+    assert roster.followers() == [node]
+    assert late_observers(roster, 26.0, 5.0, ended_at=20.0) == []
+    node.heard = 27.5
+    node.reached(60)
+    assert [why for _, why in late_observers(roster, 27.5, 5.0, ended_at=20.0)] == [
+        "You took nothing for 5 s after the end; what is left is kept for you no longer."
+    ]
+    assert late_observers(roster, 27.5, 5.0) == []
 
 
 def test_a_pace_goes_by_the_controller_too_where_a_plant_of_anothers_reports_by_the_block() -> None:

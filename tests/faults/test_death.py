@@ -2,6 +2,7 @@
 
 import re
 import signal
+from pathlib import Path
 
 import pytest
 
@@ -76,6 +77,7 @@ def test_a_node_that_hangs_is_named_after_the_deadline_the_user_has_set(role, ru
     assert f"The {role} has not answered for 0.7 s" in run.stderr
     assert re.search(r"the last tick all nodes had done is \d+ ", run.stderr)
     assert "run.deadline" in run.stderr
+    assert not Path("/proc/self/stat").exists() or "It is stopped, by a signal or a debugger." in run.stderr
     assert same_bits(haploop.logger.read(run.out), undisturbed) >= 200
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 _STATES = {
@@ -20,19 +21,23 @@ NOBODY = -1
 
 
 class Strain:
-    """What silent processes were doing, as far as the system tells it, which is where there is /proc."""
+    """What silent processes were doing, as far as the system tells it, which is where there is /proc.
 
-    def __init__(self) -> None:
+    ``look`` returns the state of a process by its pid, a letter, and the processor time that it has used, s.
+    """
+
+    def __init__(self, look: Callable[[int], tuple[str, float]] | None = None) -> None:
+        self._look = look or _state
         self._first: dict[int, tuple[float, float, float]] = {}
 
     def note(self, pid: int, heard: float, now: float) -> None:
         """Takes note of a process that is silent, at wall time ``now`` and last heard of at ``heard``, s."""
         if self._first.get(pid, (0.0,))[0] != heard:
-            self._first[pid] = heard, now, _state(pid)[1]
+            self._first[pid] = heard, now, self._look(pid)[1]
 
     def told(self, pid: int, now: float) -> str:
         """Returns sentences on what may have kept one that was noted before from answering; "" for nothing."""
-        state, used_s = _state(pid)
+        state, used_s = self._look(pid)
         _, since, used_then_s = self._first[pid]
         share = (used_s - used_then_s) / max(now - since, 1e-3)
         why = _STATES.get(state, "")
