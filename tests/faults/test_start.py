@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from haploop.launch.processes import children, open_files, supervisor
+from haploop.launch.processes import children, deadlines, open_files
 from haploop.launch.spec import OutputError, RunFailed
 from helpers.live.live_run import Going, going
 
@@ -35,8 +35,8 @@ def test_a_node_that_hangs_before_the_first_tick_is_named_after_the_deadline_of_
 ) -> None:
     with going(tmp_path, "duration=600", "run.deadline=0.6", start_gate=never) as run:
         stop_when_joined(run, role)
-        monkeypatch.setattr(supervisor, "START_DEADLINE_S", 4.0)
-        with pytest.raises(RunFailed, match=f"The {role} has not answered for 4 s .* done is 0 "):
+        monkeypatch.setattr(deadlines, "START_DEADLINE_S", 2.0)
+        with pytest.raises(RunFailed, match=f"The {role} has not answered for 2 s .* done is 0 "):
             run.result()
 
 
