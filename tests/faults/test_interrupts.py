@@ -2,6 +2,8 @@
 
 import json
 import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -85,3 +87,27 @@ def test_the_first_signal_ends_a_run_in_one_process_in_order_too(number, launche
     assert 0 < summary["ticks"] < 600_000
     assert_stopped_in_order(run, summary, undisturbed)
     assert replay(out).differences == []
+
+
+@pytest.mark.parametrize(
+    "moment",
+    [
+        # as the commands are imported
+        "kept = builtins.__import__\n"
+        "def met(name, *others):\n"
+        "    if name == 'haploop.tools.cli.app': signal.raise_signal(signal.SIGINT)\n"
+        "    return kept(name, *others)\n"
+        "builtins.__import__ = met\n",
+        # as soon as they have been
+        "kept = LeavingAtOnce.__exit__\n"
+        "def met(self, *others):\n"
+        "    kept(self, *others)\n"
+        "    signal.raise_signal(signal.SIGINT)\n"
+        "LeavingAtOnce.__exit__ = met\n",
+    ],
+    ids=["in an import", "after the imports"],
+)
+def test_ctrl_c_before_a_command_has_begun_is_a_sentence(moment):
+    start = "import builtins, signal\nfrom haploop.tools.cli.main import LeavingAtOnce, main\n"
+    done = subprocess.run([sys.executable, "-c", f"{start}{moment}main()"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", "Interrupted before anything began.\n")

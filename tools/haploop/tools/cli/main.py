@@ -14,12 +14,12 @@ _OF_TYPER = 130
 
 def main() -> None:
     """Runs the command line. Exit status: 0 done, 1 the run failed or was interrupted, 2 wrong usage or scene."""
-    with LeavingAtOnce():
-        from haploop.launch.processes.one_thread import ask_for_one_thread
-
-        ask_for_one_thread(os.environ)
-        from haploop.tools.cli.app import app
     try:
+        with LeavingAtOnce():
+            from haploop.launch.processes.one_thread import ask_for_one_thread
+
+            ask_for_one_thread(os.environ)
+            from haploop.tools.cli.app import app
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         _refuse_what_is_no_text(sys.argv[1:])
         app()
