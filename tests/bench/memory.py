@@ -19,12 +19,13 @@ def resident_MB(pid: int) -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def processes_of(identity: str) -> dict[str, int]:
-    """Role -> pid of a run's processes, the launcher being this one (Linux)."""
+def processes_of() -> dict[str, int]:
+    """Role -> pid of the processes of this launcher's run, itself among them (Linux)."""
     found = {"launcher": os.getpid()}
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         words = path.read_bytes().decode(errors="replace").split("\0")
-        if "-m" in words and any(word.endswith(f"/{identity}") for word in words):
+        parent = path.with_name("stat").read_text(encoding="utf-8").rpartition(")")[2].split()[1]
+        if "-m" in words and int(parent) == os.getpid():
             found[words[words.index("-m") + 1].split(".")[1]] = int(path.parent.name)
     return found
 
@@ -32,16 +33,15 @@ def processes_of(identity: str) -> dict[str, int]:
 def main() -> None:
     """Run ten simulated minutes and print what each process held after one minute, near the end, and the growth."""
     seen: dict[str, dict[str, float]] = {}
-    identities: list[str] = []
 
     def look(status: dict[str, Any]) -> None:
         tick = status.get("t_s", 0.0) * 1000
         when = "one minute" if tick < FIRST_TICK * 1.5 else "ten minutes"
         if when not in seen and (FIRST_TICK <= tick < FIRST_TICK * 1.5 or tick > 0.95 * LAST_TICK):
-            seen[when] = {role: resident_MB(pid) for role, pid in processes_of(identities[0]).items()}
+            seen[when] = {role: resident_MB(pid) for role, pid in processes_of().items()}
 
     with tempfile.TemporaryDirectory() as folder:
-        run(prepare(SCENE, ["duration=600"], out=Path(folder, "out")), on_progress=look, on_started=identities.append)
+        run(prepare(SCENE, ["duration=600"], out=Path(folder, "out")), on_progress=look)
     for role, before in seen["one minute"].items():
         after = seen["ten minutes"][role]
         print(f"{role:<12}{before:8.1f} MB after one minute {after:8.1f} MB after ten {after - before:+7.2f} MB")

@@ -2,6 +2,7 @@
 
 import os
 import resource
+import select
 import signal
 import threading
 from pathlib import Path
@@ -10,7 +11,10 @@ from typing import Any
 import pytest
 
 from haploop.launch.processes import children, deadlines, open_files
+from haploop.launch.processes.early import start_early, start_node
 from haploop.launch.spec import OutputError, RunFailed
+from haploop.protocol.transport.messages import PROCESSES
+from helpers.live.launched import PATIENCE_S
 from helpers.live.live_run import Going, going
 
 
@@ -80,3 +84,22 @@ def test_where_a_run_may_open_too_few_files_that_is_a_sentence(monkeypatch: pyte
     monkeypatch.setattr(resource, "getrlimit", lambda _: (40, 40))
     with pytest.raises(OutputError, match=r"opens up to 64 files, but here .* 40; allow more with ulimit -n 64"):
         open_files.allow_many()
+
+
+def test_the_processes_of_a_run_load_beside_their_launcher_but_for_those_it_may_not_need() -> None:
+    early = start_early(["run", "fig6c"])
+    assert early.keys() == PROCESSES.keys()
+    for process in early.values():
+        process.end()
+        assert process.process.returncode == -signal.SIGKILL
+    for words in ([], ["check", "fig6c"], ["run", "fig6c", "--in-process"], ["run", "--node=plant=own", "fig6c"]):
+        assert start_early(words) == {}
+
+
+def test_a_process_that_is_told_of_no_run_ends_with_its_launcher() -> None:
+    waiting = start_node("controller")
+    assert waiting.process.stdin
+    waiting.process.stdin.close()
+    assert select.select([waiting.died], [], [], PATIENCE_S)[0] == [waiting.died]
+    assert waiting.process.wait() == 1
+    os.close(waiting.died)

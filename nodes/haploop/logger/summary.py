@@ -8,7 +8,6 @@ import math
 import platform
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -53,6 +52,8 @@ def note_accounts(accounts: dict[int, Account], elements: Iterable[Description],
 
 def versions() -> dict[str, str]:
     """Returns the versions of what the run was made with."""
+    from importlib.metadata import version  # which takes a tenth of the logger's start
+
     packages = {name: version(name) for name in ("haploop", "numpy", "pyzmq", "msgpack")}
     return {**packages, "python": platform.python_version()}
 

@@ -8,11 +8,11 @@ import os
 import secrets
 import signal
 import subprocess
-import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from pathlib import Path
 from typing import Any
 
+from haploop.launch.processes.early import Started, start_node, start_process
 from haploop.launch.processes.foreign import Program
 from haploop.launch.processes.one_thread import ask_for_one_thread
 from haploop.launch.spec import OutputError
@@ -35,53 +35,41 @@ class Child:
     their file goes to the launcher's stderr, never to its stdout.
 
     A program of somebody else's writes what it prints to the file of prints from the start, and ends with all that it
-    has started.
+    has started. One of the run's own may have been started ``early``.
 
     Attributes:
         died: a file descriptor that becomes readable, without polling, when the process has ended.
     """
 
-    def __init__(self, role: str, sockets: Path, start: Message, program: Program | None = None) -> None:
-        self.role = role
-        environment = {**os.environ}
-        ask_for_one_thread(environment)
-        words = program.words if program else (sys.executable, "-m", PROCESSES[role].module)
-        self._group = _Group(environment) if program else None
-        prints = os.open(start["prints"], os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666) if program else None
-        # Where the kernel has no descriptor of a process: a pipe that is open as long as it lives.
-        self.died, alive = (-1, -1) if _has_pidfd() else os.pipe()
+    def __init__(
+        self, role: str, sockets: Path, start: Message, program: Program | None = None, early: Started | None = None
+    ) -> None:
+        self.role, self._group = role, None
         try:
-            self._process = subprocess.Popen(
-                [*words, str(sockets)],
-                stdin=subprocess.PIPE,
-                stdout=_terminal() if prints is None else prints,
-                stderr=prints,
-                pass_fds=() if alive < 0 else (alive,),
-                # A group of its own, since Ctrl-C is for the launcher, which ends the run in order; but the same
-                # session: the kernel schedules sessions as groups, and two preempt each other at every message.
-                process_group=self._group.id if self._group else 0,
-                env=environment,
-            )
+            self._process, self.died = early or (self._start(program, sockets, start) if program else start_node(role))
         except OSError as error:
             if self._group:
                 self._group.kill()
-            if self.died >= 0:
-                os.close(self.died)
             label = program.label if program else role
             raise OutputError(f"The {label} cannot be started: {error.strerror}.") from error
-        finally:
-            for descriptor in (prints, alive):
-                if descriptor is not None and descriptor >= 0:
-                    os.close(descriptor)
         if program and start["cores"]:
             with contextlib.suppress(OSError):
                 os.sched_setaffinity(self._process.pid, start["cores"])
-        if alive < 0:
-            self.died = os.pidfd_open(self._process.pid)
         assert self._process.stdin
+        told = start if program else {**start, "directory": str(sockets)}
         with contextlib.suppress(BrokenPipeError):
-            self._process.stdin.write(json.dumps(start).encode() + b"\n")
+            self._process.stdin.write(json.dumps(told).encode() + b"\n")
             self._process.stdin.flush()
+
+    def _start(self, program: Program, sockets: Path, start: Message) -> Started:
+        environment = {**os.environ}
+        ask_for_one_thread(environment)
+        self._group = _Group(environment)
+        prints = os.open(start["prints"], os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+        try:
+            return start_process([*program.words, str(sockets)], environment, prints, self._group.id)
+        finally:
+            os.close(prints)
 
     @property
     def pid(self) -> int:
@@ -172,32 +160,20 @@ class _Group:
         self._guard.communicate()
 
 
-def _has_pidfd() -> bool:
-    """Tells whether a process can be watched by a descriptor of its own (Linux 5.3)."""
-    try:
-        os.close(os.pidfd_open(os.getpid()))
-    except (AttributeError, OSError):
-        return False
-    return True
-
-
-def _terminal() -> int:
-    """Returns the launcher's stderr, or nowhere if that is closed."""
-    try:
-        os.fstat(2)
-    except OSError:
-        return subprocess.DEVNULL
-    return 2
-
-
 def start_children(
-    sockets: Path, start: Callable[[str], Message], pin: bool, run_number: int, programs: Mapping[str, Program]
+    sockets: Path,
+    start: Callable[[str], Message],
+    pin: bool,
+    run_number: int,
+    programs: Mapping[str, Program],
+    early: MutableMapping[str, Started] | None = None,
 ) -> dict[str, Child]:
     """Starts every process of the table but those that somebody else starts.
 
     Args:
         start: what the process of a role is told at its start.
         programs: programs that take the place of the table's, by role.
+        early: processes that wait to be told, by role; they are taken out.
 
     Plant and controller wait for each other at every tick and gain nothing from two cores, but lose the wake-up from
     one to the other: they share a core, the others get the rest. Runs beside each other take different cores. A process
@@ -213,7 +189,8 @@ def start_children(
             if program and program.is_external:
                 continue
             cores = loop_cores if process.on_loop_core else other_cores
-            children[role] = Child(role, sockets, {**start(role), "cores": cores}, program)
+            started = early.pop(role, None) if early else None
+            children[role] = Child(role, sockets, {**start(role), "cores": cores}, program, started)
     except BaseException:
         for child in children.values():
             child.kill()

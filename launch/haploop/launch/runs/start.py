@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import MutableMapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from haploop.launch.spec import RunFailed, RunSpec, discard, keep_plugin, make_o
 from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
+    from haploop.launch.processes.early import Started
     from haploop.launch.stability.decide import Finding
     from haploop.logger.summary import Summary
     from haploop.protocol.changes import Event
@@ -106,7 +108,9 @@ def lay_out(
     return RunSpec(scene, kinds, directory, attachments, kept, sources, files, is_new=is_new)
 
 
-def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
+def run(
+    spec: RunSpec, *, in_process: bool = False, early: MutableMapping[str, Started] | None = None, **options: Any
+) -> Summary:
     """Runs a scene and returns its summary.
 
     The first SIGINT or SIGTERM ends the run in order, with a summary of what ran; the second at once.
@@ -114,6 +118,7 @@ def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
     Args:
         spec: the run, as prepared.
         in_process: everything in this process; else plant, controller and logger in one each.
+        early: such processes that have been started already, by role; they are taken out.
         options: fields of ``RunSpec`` that take the place of those of ``spec``.
 
     Raises:
@@ -127,10 +132,11 @@ def run(spec: RunSpec, *, in_process: bool = False, **options: Any) -> Summary:
     if not in_process:
         try:
             from haploop.launch.clock.device_time import check_owner
+            from haploop.launch.processes.children import start_children
             from haploop.launch.processes.supervisor import run_processes
 
             check_owner(spec)
-            made = run_processes(spec)
+            made = run_processes(spec, start_nodes=partial(start_children, early=early))
         except RunFailed:
             raise
         except BaseException:

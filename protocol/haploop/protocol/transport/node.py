@@ -30,15 +30,14 @@ class NodeError(Exception):
 
 
 def run_node(role: str, work: Work) -> None:
-    """Runs a node as a process, ``python -m module DIRECTORY``, and exits with status 0 after DONE, else 1.
+    """Runs a node as a process, ``python -m module``, and exits with status 0 after DONE, else 1.
 
-    Stdin brings one line of JSON: address of the clock, secret and transport of the run, the file to which what is
-    printed goes, and the cores to stay on, null for any.
+    Stdin brings one line of JSON: directory of the sockets, address of the clock, secret and transport of the run, the
+    file to which what is printed goes, and the cores to stay on, null for any.
 
     It stays open as long as the launcher lives; at its end this process ends at once, whatever it is doing. After DONE
     one line more comes: those who may miss nothing have what was published, and this process may go.
     """
-    directory = Path(sys.argv[1])
     line = sys.stdin.readline()
     if not line:
         sys.exit(1)  # the launcher is gone already
@@ -51,7 +50,7 @@ def run_node(role: str, work: Work) -> None:
     sys.stdin = open(os.devnull)  # noqa: SIM115, PTH123 (code that asks for input gets none)
     gc.freeze()
     context = SecureContext.from_transport(Transport.from_dict(start["transport"]))
-    sys.exit(take_part(context, role, work, start, directory, life=life))
+    sys.exit(take_part(context, role, work, start, Path(start["directory"]), life=life))
 
 
 class LineOfLife:

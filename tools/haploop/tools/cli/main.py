@@ -5,8 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from typing import TYPE_CHECKING
 
 from haploop.tools.cli.interrupt import SENTENCE, LeavingAtOnce
+
+if TYPE_CHECKING:
+    from haploop.launch.processes.early import Started
 
 # The status with which typer leaves at Ctrl-C, without a word.
 _OF_TYPER = 130
@@ -14,15 +18,17 @@ _OF_TYPER = 130
 
 def main() -> None:
     """Runs the command line. Exit status: 0 done, 1 the run failed or was interrupted, 2 wrong usage or scene."""
+    early: dict[str, Started] = {}
     try:
         with LeavingAtOnce():
             from haploop.launch.processes.one_thread import ask_for_one_thread
 
             ask_for_one_thread(os.environ)
+            early = _started(sys.argv[1:])
             from haploop.tools.cli.app import app
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         _refuse_what_is_no_text(sys.argv[1:])
-        app()
+        app(obj=early)
     except OSError as error:  # one that no command has words of its own for
         print(f"{error.filename or 'A file'} cannot be used: {error.strerror or error}.", file=sys.stderr)
         sys.exit(1)
@@ -31,6 +37,18 @@ def main() -> None:
             raise
         print(SENTENCE if isinstance(error, KeyboardInterrupt) else "Interrupted.", file=sys.stderr)
         sys.exit(1)
+    finally:
+        for process in early.values():  # that no run has taken
+            process.end()
+
+
+def _started(words: list[str]) -> dict[str, Started]:
+    """Starts the processes of a run, so that they load while this one does; what takes none loads no more for it."""
+    if words[:1] != ["run"]:
+        return {}
+    from haploop.launch.processes.early import start_early
+
+    return start_early(words)
 
 
 def _refuse_what_is_no_text(words: list[str]) -> None:

@@ -29,6 +29,7 @@ from haploop.tools.cli.view import UntilClosed
 
 
 def run(
+    context: typer.Context,
     scene: SceneFile,
     set: Set = None,
     out: Annotated[Path | None, typer.Option(help="directory to write to, new or empty [runs/SCENE-TIME]")] = None,
@@ -104,6 +105,7 @@ def run(
                 summary = start.run(
                     prepared,
                     in_process=in_process,
+                    early=context.obj,
                     pace=math.inf if rate == "free" else rate,
                     clock=clock,
                     transport=transport,
