@@ -103,7 +103,7 @@ def advise(
 def compare(
     device: str | Path, *, grid: bool = True, workers: int | None = None, out: str | Path | None = None, **asked: Any
 ) -> Comparison:
-    """Compares every stabilizer, each tuned alike, on a device or a scene; takes minutes to an hour.
+    """Compares every stabilizer, each tuned alike, on a device or a scene; takes some minutes.
 
     Arguments and errors are those of ``advise``; ``grid``: also with more delay, a finer encoder, a slower drive.
     """

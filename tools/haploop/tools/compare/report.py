@@ -20,20 +20,20 @@ from haploop.tools.render.units import amount, fixed
 from haploop.tools.search.intervals import mean_interval
 
 READING = (
-    "Wall: the stiffest of a seed's conditions that is safe, as are all softer ones tried, mean of the seeds. Held: "
-    "mean force over mean measured penetration. More than none: the same less what is held without any element, mean "
-    "and 95 % interval of the differences seed by seed. Contact: slope of the force on the first way in. Ripple: of "
-    "the command above 30 Hz, peak to peak. Extra: the element's own force, largest and root mean square. ±20 %: what "
-    "is held with all parameters, or the device, 20 % less and 20 % more, over that without. * a parameter at the end "
-    "of its search, † no wall was too stiff: what is told may be more elsewhere. Two are apart where the interval of "
-    "their difference does not hold 0; told apart is what is so under two sets of seeds, tuning included. Bold: those "
-    "not told from the best; ▲ ▼ those that are told to hold more, or less, than none."
+    "Wall: the stiffest that is safe in all conditions of a seed, as are all softer ones tried, mean over the seeds. "
+    "Held: mean force over mean measured penetration of that wall. More than none: held, less what is held without any "
+    "element under the same seed, mean and 95 % interval over the seeds. Contact: slope of the force on the first way "
+    "in. Ripple: of the command above 30 Hz, peak to peak. Extra: the element's own force, largest and root mean "
+    "square. ±20 %: what is held with all parameters, or the device, 20 % less and 20 % more, over that without. "
+    "Breaks first: the softest wall that failed under any seed. * a parameter at the end of its search, † no wall was "
+    "too stiff: with others more may be held. ▲ ▼ told to hold more, or less, than none: the interval does not hold 0, "
+    "the same way under two sets of seeds, tuning included. Bold: not told from the best by the same rule."
 )
 SIGNS = {"more": " ▲", "less": " ▼", "alike": ""}
 _TIED = "{0} renders most, {1}; it cannot be told apart from {2}."
 _NO_GAIN = "No element can be told to hold more than none, {0}."
 _FIRST = "{0} renders most, {1}, and more than every other."
-_AGAIN = "{0} of {1} pairs that are apart are so under other seeds, tuning included; {2} are the other way round."
+_AGAIN = "{0} of {1} pairs that differ under these seeds do so under others, too; {2} are the other way round."
 
 
 def report(told: Comparison) -> RenderableType:
@@ -54,11 +54,10 @@ def report(told: Comparison) -> RenderableType:
 
 def task_sentence(told: Comparison) -> str:
     effort = told.effort
-    sets = effort.points + effort.finalists + effort.around + 1
     return (
-        f"Tried by {told.task}; a seed draws {effort.of_seed} such conditions. {sets} sets of parameters each: "
-        f"{effort.points + 1} by {effort.first} seeds, the best {effort.finalists} and {effort.around} about them by "
-        f"{effort.tuning}; then the best one by {effort.seeds} others. So the walls are for comparing, not for "
+        f"Tried by {told.task}; a seed draws {effort.of_seed} such conditions. Of each element {effort.points + 1} "
+        f"sets of parameters are tried by {effort.first} seeds, then the best {effort.finalists} and {effort.around} "
+        f"about them by {effort.tuning}, then the best by {effort.seeds} others. The walls are for comparing, not for "
         "building: `haploop advise` tries one in some thousand cases."
     )
 
