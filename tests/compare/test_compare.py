@@ -170,21 +170,22 @@ def test_what_may_differ_by_nothing_or_is_not_reproduced_cannot_be_told_apart():
 def test_the_sentences_follow_from_the_rankings():
     told = sentences([compared()])
     assert len(told) == 5
-    assert "adaptive inertia does not help" in told[4]
-    assert told[0] == "Most is held, as described, on a device at 0 ms by no element more than by none, 1.00 N/mm."
-    assert told[1].startswith("Take nothing on a device at 0 ms: ")
-    assert told[2] == "Damping against nothing: it cannot be told from it on any of these loops."
+    assert told[0] == "As described, most is held on a device by no element more than without, 1.00 N/mm."
+    assert told[1].startswith("Take nothing on a device: ")
+    assert told[2] == "Damping cannot be told from no element on any of these loops."
+    assert told[4].endswith("so adaptive inertia does not help, as far as can be told.")
     helped = sentences([compared(adaptive_damping_and_inertia=2000.0)])
-    assert "against adaptive damping: it holds more on each of these loops" in helped[4]
-    assert helped[4].endswith("adaptive inertia helps there.")
+    assert "inertia holds more on a device (1 of 1) than adaptive damping; adaptive inertia cannot" in helped[4]
+    assert helped[4].endswith("so adaptive inertia helps, and on a device it is what to take.")
     assert helped[1].startswith("Take adaptive damping and inertia on")
     both = sentences([compared(adaptive_damping_and_inertia=2000.0, damping=2000.0)])
     assert both[1].startswith("Take damping on"), "the simpler of two that are alike"
-    assert "but nowhere more than" in both[4]
-    worse = sentences([compared(adaptive_damping_and_inertia=2000.0, adaptive_inertia=500.0)])
-    assert "adaptive inertia is no remedy" in worse[4]
-    harmful = sentences([compared(unidirectional_inertia=500.0)])
-    assert "holds less on each of these loops" in harmful[3]
+    assert both[4].endswith("but nowhere more than every other element.")
+    mixed = sentences([compared(adaptive_damping_and_inertia=2000.0, adaptive_inertia=500.0)])
+    assert mixed[4].endswith("helps on some loops and harms on others.")
+    harmful = sentences([compared(unidirectional_inertia=500.0, adaptive_inertia=500.0)])
+    assert harmful[3].startswith("Unidirectional inertia holds less on a device (1 of 1) than no element; ")
+    assert harmful[4].endswith("does not help, and harms.")
 
 
 def test_loops_are_named_by_their_device_once_for_all_of_them():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import asdict, dataclass, replace
@@ -178,23 +177,14 @@ def _each(
 
 
 def _as_rows(data: Sequence[dict[str, Any]]) -> tuple[Row, ...]:
-    return tuple(map(_as_row, data))
-
-
-def _as_row(data: dict[str, Any]) -> Row:
-    """Returns the row that ``asdict`` and JSON made lists of."""
-    return Row(
-        family=data["family"],
-        block=data["block"],
-        values=tuple(data["values"]),
-        at_edge=tuple(data["at_edge"]),
-        seeds=tuple(_as_trying(each) for each in data["seeds"]),
-        parameter=tuple(data["parameter"]),
-        device=tuple(data["device"]),
+    """Returns the rows that ``asdict`` and JSON made lists of."""
+    tuples = ("values", "at_edge", "parameter", "device")
+    return tuple(
+        Row(**each | {name: tuple(each[name]) for name in tuples} | {"seeds": tuple(map(_as_trying, each["seeds"]))})
+        for each in data
     )
 
 
 def _as_trying(data: Sequence[Any]) -> Trying:
     limit_N_m, wall_N_m, shown, fails_N_m, failure = data
-    fails = math.inf if fails_N_m is None else fails_N_m
-    return Trying(limit_N_m, wall_N_m, Rendered(*shown), fails, Failure(**failure) if failure else None)
+    return Trying(limit_N_m, wall_N_m, Rendered(*shown), fails_N_m, Failure(**failure) if failure else None)

@@ -47,12 +47,13 @@ for a device or a scene of yours. One is said to hold *more* than another where 
 seed by seed under the same conditions, does not hold 0, the same way under two sets of seeds that share nothing, tuning
 included; all else cannot be told apart. A device file without a cable is taken as rigid, which without a delay would
 bear walls that no device renders: such a device has a round trip of 1 ms here."""
-_WHERE = {"more": "holds more on {0}", "less": "holds less on {0}", "alike": "cannot be told from it on {0}"}
-_EVERYWHERE = {"more": "each of these loops", "less": "each of these loops", "alike": "any of these loops"}
-_HELPS = "adaptive inertia helps there"
-_NO_BETTER = "adaptive inertia helps there, but nowhere more than all simpler elements do"
-_MIXED = "adaptive inertia is no remedy"
-_NOT = "adaptive inertia does not help, as far as can be told"
+_HELPS = "so adaptive inertia helps, but nowhere more than every other element"
+_BEST = "so adaptive inertia helps, and on {0} it is what to take"
+_MIXED = "so adaptive inertia helps on some loops and harms on others"
+_HARMS, _NOT = (
+    "so adaptive inertia does not help, and harms",
+    "so adaptive inertia does not help, as far as can be told",
+)
 _HEADS = {
     "element": "element", "parameter": "parameter", "wall": "wall, N/mm", "held": "held, N/mm",
     "more": "more than none, N/mm", "contact": "contact, N/mm", "ripple": "ripple", "extra": "extra", "±20 %": "±20 %",
@@ -67,85 +68,90 @@ and numbers that the device files assume are taken as they are. Parameters are t
 ripple. A virtual coupling holds less than its wall. What is told as at the end of a search may be more with other
 parameters."""
 
+# What inertia adds: to adaptive damping, and by itself.
+_ADAPTIVE = ((ADAPTIVE_BOTH, ADAPTIVE_DAMPING), (ADAPTIVE_INERTIA, NOTHING))
 # A loop by the names of its device and of itself.
-Loops = dict[tuple[str, str], OfLoop]
+Place = tuple[str, str]
+Loops = dict[Place, OfLoop]
 
 
 def sentences(comparisons: Sequence[Comparison]) -> list[str]:
     """Returns the five sentences; each name of a loop in them is put there by a condition on its rankings."""
-    loops = {(name_of(told), of.name): of for told in comparisons for of in told.loops}
-    taken: dict[str, list[tuple[str, str]]] = {}
+    loops = {(told.name, of.name): of for told in comparisons for of in told.loops}
+    taken: dict[str, list[Place]] = {}
     for place, of in loops.items():
         taken.setdefault(choice(of).family, []).append(place)
-    firsts = "; ".join(_first(name_of(told), told.loops[0]) for told in comparisons)
-    stands = ". ".join(versus(UNIDIRECTIONAL, other, loops) for other in (NOTHING, DAMPING, BIDIRECTIONAL))
-    adaptive = f"{versus(ADAPTIVE_BOTH, ADAPTIVE_DAMPING, loops)}. {versus(ADAPTIVE_INERTIA, NOTHING, loops)}"
+    take = "; ".join(f"{family} on {places(of, loops)}" for family, of in taken.items())
+    inertia = "; ".join(versus(UNIDIRECTIONAL, other, loops) for other in (NOTHING, DAMPING, BIDIRECTIONAL))
+    adaptive = "; ".join(versus(*pair, loops) for pair in _ADAPTIVE)
     return [
-        f"Most is held, as described, on {firsts}.",
-        f"Take {'; '.join(f'{family} on {places(of, loops)}' for family, of in taken.items())}: on each the first in "
-        "the list of those that are told to hold more than no element, and less than no other.",
-        f"{versus(DAMPING, NOTHING, loops)}.",
-        f"{stands}.",
-        f"{adaptive}: {_verdict(loops)}.",
+        f"As described, most is held {'; '.join(_most(told.name, told.loops[0]) for told in comparisons)}.",
+        f"Take {take}: each the first in the list that is told to hold more than no element, and less than no other.",
+        _sentence(versus(DAMPING, NOTHING, loops)),
+        _sentence(inertia),
+        _sentence(f"{adaptive}; {_verdict(loops)}"),
     ]
 
 
-def name_of(told: Comparison) -> str:
-    """Returns the device with the round trip of its first loop."""
-    return f"{told.name} at {told.loops[0].delay_s * 1e3:g} ms"
-
-
 def versus(some: Family, other: Family, loops: Loops) -> str:
-    """Says where some family holds more than another, where less, and where it cannot be told from it."""
-    where = _compared(some, other, loops)
-    at = {word: _EVERYWHERE[word] if len(of) == len(loops) else places(of, loops) for word, of in where.items()}
-    told = "; it ".join(_WHERE[word].format(place) for word, place in at.items() if where[word])
-    return f"{_capital(some.name)} against {other.name}: it {told}"
+    """Says on how many loops of which device some family holds more than another, and on how many less."""
+    where, than = _compared(some, other, loops), "no element" if other is NOTHING else other.name
+    told = [f"{word} {_counted(where[word], loops)}" for word in ("more", "less") if where[word]]
+    if not told:
+        return f"{some.name} cannot be told from {than} on any of these loops"
+    elsewhere = ", and cannot be told from it elsewhere" * bool(where["alike"])
+    return f"{some.name} holds {', '.join(told)} than {than}{elsewhere}"
 
 
-def places(of: Sequence[tuple[str, str]], loops: Loops) -> str:
+def places(of: Sequence[Place], loops: Loops) -> str:
     """Names loops by device: ``every loop of touch``, or ``touch (as described, drive of 100 Hz)``."""
     words = []
-    for device in dict.fromkeys(device for device, _ in of):
-        named, every = [name for on, name in of if on == device], [name for on, name in loops if on == device]
-        is_all = len(named) == len(every)
-        words.append(
-            (f"every loop of {device}" if len(every) > 1 else device) if is_all else f"{device} ({', '.join(named)})"
-        )
+    for device, (named, every) in _by_device(of, loops).items():
+        whole = f"every loop of {device}" if len(every) > 1 else device
+        words.append(whole if len(named) == len(every) else f"{device} ({', '.join(named)})")
     return join(words)
 
 
-def _compared(some: Family, other: Family, loops: Loops) -> dict[str, list[tuple[str, str]]]:
-    found: dict[str, list[tuple[str, str]]] = {"more": [], "less": [], "alike": []}
+def _counted(of: Sequence[Place], loops: Loops) -> str:
+    """Counts loops by device: ``on touch (4 of 4) and omega3 (1 of 4)``."""
+    each = _by_device(of, loops).items()
+    return f"on {join([f'{device} ({len(named)} of {len(every)})' for device, (named, every) in each])}"
+
+
+def _by_device(of: Sequence[Place], loops: Loops) -> dict[str, tuple[list[str], list[str]]]:
+    """Returns the names of these loops, and of all, of every device that has any of these."""
+    return {
+        device: ([name for on, name in of if on == device], [name for on, name in loops if on == device])
+        for device in dict.fromkeys(device for device, _ in of)
+    }
+
+
+def _compared(some: Family, other: Family, loops: Loops) -> dict[str, list[Place]]:
+    found: dict[str, list[Place]] = {"more": [], "less": [], "alike": []}
     for place, of in loops.items():
         found[ranking(of).versus(some.name, other.name)].append(place)
     return found
 
 
 def _verdict(loops: Loops) -> str:
-    """Says whether inertia of an adaptive element helps: on some loop, and whether it is what to take on any."""
-    pairs = ((ADAPTIVE_BOTH, ADAPTIVE_DAMPING), (ADAPTIVE_INERTIA, NOTHING))
-    helps = [_compared(*pair, loops) for pair in pairs]
-    if not any(each["more"] for each in helps):
-        return _NOT
-    if any(each["less"] for each in helps):
-        return _MIXED
-    adaptive = (ADAPTIVE_INERTIA.name, ADAPTIVE_BOTH.name)
-    is_taken = any(choice(of).family in adaptive for of in loops.values())
-    return _HELPS if is_taken else _NO_BETTER
+    """Says whether inertia of an adaptive element helps on any loop, harms on any, and is what to take on any."""
+    helps = [_compared(*pair, loops) for pair in _ADAPTIVE]
+    more, less = (any(each[word] for each in helps) for word in ("more", "less"))
+    if not more or less:
+        return _MIXED if more else _HARMS if less else _NOT
+    best = [place for place, of in loops.items() if choice(of).family in (ADAPTIVE_INERTIA.name, ADAPTIVE_BOTH.name)]
+    return _BEST.format(places(best, loops)) if best else _HELPS
 
 
-def _first(device: str, of: OfLoop) -> str:
-    found, tied = best(of)
-    alone = format_stiffness(held(without(of.rows)).value)
+def _most(device: str, of: OfLoop) -> str:
+    found, alone = best(of)[0], format_stiffness(held(without(of.rows)).value)
     if choice(of).family == NOTHING.name:
-        return f"{device} by no element more than by none, {alone}"
-    alike = f", not told from {join([row.family for row in tied])}" if tied else ", more than every other"
-    return f"{device} by {found.family}, {format_stiffness(held(found).value)} against {alone} without{alike}"
+        return f"on {device} by no element more than without, {alone}"
+    return f"on {device} by {found.family}, {format_stiffness(held(found).value)} against {alone} without"
 
 
-def _capital(words: str) -> str:
-    return words[:1].upper() + words[1:]
+def _sentence(words: str) -> str:
+    return f"{words[:1].upper()}{words[1:]}."
 
 
 def page(comparisons: Sequence[Comparison]) -> str:
