@@ -8,6 +8,9 @@ SEEDS ?= 2000
 N ?= 50
 FROM ?= 0
 GRID ?= --no-grid
+# A history of make bench, as runs/bench.jsonl is.
+COMPARE ?=
+HELD = $(if $(COMPARE),--compare $(COMPARE))
 PIP := $(PYTHON) -m pip --python $(BIN)/python -qq --disable-pip-version-check --no-input
 READY := .venv/.installed
 
@@ -49,12 +52,12 @@ check: $(READY) ## lint, format, types and the arrows between the packages
 	@$(BIN)/pyright
 	@$(BIN)/lint-imports
 
-bench: $(READY) ## measure speed, memory, what each effect and the live page cost on this machine (about twelve minutes)
-	@$(BIN)/python tests/bench/bench.py
+bench: $(READY) ## measure speed, memory, what each effect and the live page cost on this machine (about twelve minutes); COMPARE=FILE marks what is slower than in that history
+	@$(BIN)/python tests/bench/bench.py $(HELD)
 	@$(BIN)/python tests/bench/memory.py
 	@$(BIN)/python tests/bench/ablation.py
 	@$(BIN)/python tests/bench/view.py
-	@$(BIN)/python tests/bench/arrays.py
+	@$(BIN)/python tests/bench/arrays.py $(HELD)
 	@$(BIN)/python tests/bench/sweep.py
 
 accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (four minutes on two idle cores; stopped, it goes on where it was)

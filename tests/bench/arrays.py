@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from history import keep
 from rich.console import Console
 from rich.table import Table
 
@@ -78,6 +79,7 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=10_000)
     parser.add_argument("--duration", type=float, help="s; that of the scene when not given")
     parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--compare", type=Path, help="history whose last run on such a machine this one is held to")
     options = parser.parse_args()
     scenes, kinds = paper_scenes(options.scenes, options.duration), registry()
     few = scenes[:: max(1, len(scenes) // 20)]
@@ -115,12 +117,16 @@ def main() -> None:
         table.add_column(heading)
     medians = {name: statistics.median(values) for name, values in seen.items()}
     alone = medians["one process, with the books"]
+    yardsticks = dict.fromkeys(medians, "")
     for name, median in medians.items():
-        kernel = medians.get("numba kernel, without" if name.endswith("without") else "numba kernel, with the books")
+        of = "numba kernel, without" if name.endswith("without") else "numba kernel, with the books"
+        kernel = medians.get(of)
+        yardsticks[name] = of if kernel and name != of else ""
         spread = f"{min(seen[name]):.3g} - {max(seen[name]):.3g}"
         ratio = f"{median / kernel:.2f}" if kernel else ""
         table.add_row(name, f"{median:.3g}", spread, f"{alone / median:.1f}", ratio)
     Console(width=120).print(table)
+    keep("arrays", seen, yardsticks, options.compare)
 
 
 if __name__ == "__main__":
