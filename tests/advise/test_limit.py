@@ -14,7 +14,7 @@ TOLERANCE = 0.05
 FAILS = Failure("a case", 1.0, gone=False)
 
 
-def limits_of(bears, *rungs):
+def limits_of(bears, *rungs, least=LEAST_N_M):
     """The limits of loops of which only this is known: from a stiffness to whether it is borne."""
     tried: list[float] = []
 
@@ -23,7 +23,7 @@ def limits_of(bears, *rungs):
         return [[None if job.loop(wall.stiffness_N_m) else FAILS for wall in job.walls] for job in jobs]
 
     trial: Any = SimpleNamespace(of_jobs=of_jobs)
-    queries: Any = [Query(each, (), (), rungs) for each in bears]
+    queries: Any = [Query(each, (), (), rungs, least) for each in bears]
     found = limits(trial, queries, TOLERANCE)
     assert len(bears) > 1 or len(set(tried)) == len(tried), "no wall is tried twice"
     return found
@@ -54,3 +54,11 @@ def test_a_loop_that_bears_nothing_has_no_limit_and_one_that_bears_all_has_no_en
     never, always = limits_of([lambda k: False, lambda k: True], *ladder(10.0, 100.0, 2.0))
     assert (never.stiffness_N_m, never.fails_N_m) == (0.0, LEAST_N_M)
     assert (always.stiffness_N_m, always.fails_N_m) == (MOST_N_M, float("inf"))
+
+
+@given(edge=st.floats(2.0, 9e5))
+def test_a_limit_below_what_is_asked_for_is_none_and_one_above_is_found_as_always(edge):
+    rungs = ladder(1000.0, 5000.0, 1.5)
+    [found] = limits_of([lambda k: k < edge], *rungs, least=1000.0)
+    whole = limits_of([lambda k: k < edge], *rungs)[0]
+    assert found == whole if edge > 1000.0 else (found.stiffness_N_m, found.fails_N_m) == (0.0, 1000.0)

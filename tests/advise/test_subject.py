@@ -1,5 +1,7 @@
 """The subject of an advice: names, hands, delays, what a device file assumes, absurd numbers."""
 
+from contextlib import nullcontext
+
 import pytest
 
 from haploop.launch.scene.bundled import bundled
@@ -84,4 +86,15 @@ def test_a_device_of_ones_own_is_taken_as_the_presets_are_and_a_scene_with_a_wal
 def test_a_device_of_absurd_numbers_is_refused_with_what_was_expected(tmp_path, tables, words):
     (tmp_path / "mine.toml").write_text(tables)
     with pytest.raises(SceneError, match=words):
+        make_subject(str(tmp_path / "mine.toml"), None, None, None, [], KINDS)
+
+
+@pytest.mark.parametrize(("friction", "refused"), [("kinetic = 0.9", False), ("kinetic = 1.0", True),
+                                                   ("kinetic = 0.1\nbreakaway = 50.0", True)])  # fmt: skip
+def test_a_device_that_friction_holds_against_the_hand_is_refused_since_any_wall_would_seem_safe(
+    tmp_path, friction, refused
+):
+    (tmp_path / "mine.toml").write_text(f"[device]\nmass = 0.1\ndamping = 0.05\n[friction]\n{friction}\n")
+    refusal = pytest.raises(InvalidRequest, match=r"Dry friction of .* holds the device against the hand's 1.00 N")
+    with refusal if refused else nullcontext():
         make_subject(str(tmp_path / "mine.toml"), None, None, None, [], KINDS)

@@ -11,6 +11,7 @@ from haploop.plant.chain.chain import Chain
 from haploop.plant.friction import projected
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import ElementTable, Scene
+from haploop.tools.advise.report import describe
 from haploop.tools.advise.walls.cases import HOLDS, Case, corner, make_loop, ranges
 from haploop.tools.advise.walls.loops import LoneLoop, Loops, make_loops
 from haploop.tools.advise.walls.trial import Job, Store, Trial, Tried
@@ -117,6 +118,14 @@ def test_a_hold_of_the_task_alone_does_not_tell_a_wall_that_buzzes_at_another():
     assert at_three_times
 
 
+def test_a_wall_that_throws_the_device_off_for_good_cannot_be_told_and_is_not_borne():
+    thrown = make_loop(scene(device={"mass": 100.0, "damping": 0.0}), has_task=False)
+    with Trial(Store()) as trial:
+        [failure] = trial.failures(thrown, [Tried(1e5)], [Case(0.3)])
+    assert failure
+    assert describe(failure) == "cannot be told: in no case is the device still at the wall after 0.75 s"
+
+
 @pytest.mark.parametrize("factor", [0.8, 1.15])
 def test_where_the_loop_is_linear_a_wall_is_borne_below_the_limit_of_the_exact_map_and_not_above(factor):
     read = scene(
@@ -160,7 +169,7 @@ def test_no_wall_that_a_trial_bears_is_a_felt_limit_cycle_or_grows_when_pushed_w
     for device, (top, some) in elements.items():
         loop = loop_of(device)
         of = ranges(loop)
-        for _ in range(6):
+        for _ in range(4):
             case = Case(float(rng.choice(HOLDS)), corner(of, int(rng.integers(2 ** len(of)))), sway=0.0)
             stiffness = top * float(rng.uniform(0.6, 3.0))
             with Trial(Store()) as trial:
@@ -169,4 +178,4 @@ def test_no_wall_that_a_trial_bears_is_a_felt_limit_cycle_or_grows_when_pushed_w
                 found = judge_scene(placed(loop, case, stiffness, *some), KINDS)
                 borne += 1
                 assert found.word in ("steady", "no-contact"), (device, stiffness, case, found)
-    assert 4 < borne < 18
+    assert 2 < borne < 12

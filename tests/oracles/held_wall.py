@@ -1,6 +1,6 @@
 """A device held to a wall by a swaying hand, written by hand: bodies, cable, grip, dry friction, encoder, elements.
 
-Nothing of the code it judges is used: semi-implicit Euler steps of 20 us, friction as the impulse that stops a body, a
+Nothing of the code it judges is used: semi-implicit Euler steps of 50 us, friction as the impulse that stops a body, a
 buzz of motion or force read off turning points instead of spectra. All holds in all corners are columns of one array.
 """
 
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-STEP_S, PERIOD_S, LASTS_S = 2e-5, 1e-3, 3.0
+STEP_S, PERIOD_S, LASTS_S = 5e-5, 1e-3, 3.0
 STEPS = round(PERIOD_S / STEP_S)
 
 
@@ -88,13 +88,13 @@ def columns(of: Bodies, some: np.ndarray) -> Bodies:
 
 def press(
     of: Bodies, holds: np.ndarray, stiffness: Any, elements: dict[str, Any], *, sway: Any = 0.3,
-    sway_Hz: Any = 0.5, speed: Any = 0.2,
+    sway_Hz: Any = 0.5, speed: Any = 0.2, lasts_s: float = LASTS_S,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     """Returns position at the encoder, counts and command at the ticks, each of shape (ticks, members).
 
     Stiffness, elements by their kind, and the hand are numbers or one for each member.
     """
-    members, ticks = len(holds), round(LASTS_S / PERIOD_S)
+    members, ticks = len(holds), round(lasts_s / PERIOD_S)
     has_cable, h = bool(np.any(of.motor_mass)), STEP_S
     x = np.full(members, 2e-4)
     v = -speed + np.zeros(members)

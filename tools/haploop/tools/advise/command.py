@@ -17,6 +17,7 @@ from haploop.tools.advise.advice import Advice, AdviceData, advice, advice_data
 from haploop.tools.advise.figure import draw
 from haploop.tools.advise.report import report, sentences
 from haploop.tools.advise.subject import InvalidRequest, make_subject
+from haploop.tools.advise.walls.cases import Case, make_loop
 from haploop.tools.advise.walls.trial import Store, Trial
 from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with, print_notes
@@ -47,7 +48,8 @@ def advise(
         except InvalidRequest as error:
             leave(str(error), WRONG_USE)
         try_out(elements_of(asked.scene), kinds)
-        asked = replace(asked, notes=(*print_notes(asked.scene, kinds), *asked.notes))
+        tried = Case(1.0).scene(make_loop(asked.scene, asked.has_task))
+        asked = replace(asked, notes=(*print_notes(tried, kinds), *asked.notes))
         out = _output(out, asked.name)
         store = Store(out / WALLS)
         try:

@@ -92,6 +92,8 @@ def describe(failure: Failure) -> str:
     """Describes what a wall does in the case that it does not bear."""
     if failure.gone:
         return f"the device leaves its limits; {failure.case}"
+    if not failure.frequency_Hz:
+        return failure.case
     felt = "force" if failure.by_force else "motion"
     swing = f"{amount(failure.force_N, 'N', 2)} and {amount(failure.motion_m, 'm', 2)} peak to peak"
     return f"{swing} at {failure.frequency_Hz:.0f} Hz, felt as {felt}; {failure.case}"

@@ -18,7 +18,8 @@ from haploop.protocol.changes import Change, at_work
 from haploop.protocol.names import nearest
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.walls.registry import class_of
-from haploop.tools.advise.walls.cases import MOST_DELAY_S
+from haploop.tools.advise.walls.cases import MOST_DELAY_S, hold_N, make_loop
+from haploop.tools.render.units import amount
 
 # The only measured hand there is, along the axis of Choi et al. 2022.
 DEFAULT_HAND = "fu_cavusoglu_y"
@@ -38,6 +39,10 @@ _TOO_LATE = (
 _NO_SPRING = (
     "The scene's wall is of the kind {0}; advice is on springs, which are what it tries. "
     "Take wall.kind out to be advised on a spring."
+)
+_STUCK = (
+    "Dry friction of {0} holds the device against the hand's {1}: it would not press on the wall, and any wall would "
+    "seem safe. Give the friction as it is, in N, or a hand that presses harder (hand.force)."
 )
 
 # How a device file says which of its numbers are assumed.
@@ -114,6 +119,9 @@ def make_subject(
         notes.append("What the scene's events change is taken as changed from the start.")
     if (kind := class_of(scene.wall).kind) != "spring":
         raise InvalidRequest(_NO_SPRING.format(kind))
+    rubs, presses_N = scene.friction, hold_N(make_loop(scene, has_task))
+    if rubs and (most_N := max(rubs.kinetic, rubs.breakaway or 0.0)) >= presses_N:
+        raise InvalidRequest(_STUCK.format(amount(most_N, "N"), amount(presses_N, "N")))
     return Subject(path.stem, scene, has_task, tuple(notes), assumptions(path))
 
 

@@ -28,6 +28,8 @@ STRETCH_S, FROM_S = 0.25, 0.75
 # A stretch of a swing that dies is this share of the one before at most; what then still dies is watched so many times
 # as long.
 _DYING, _LONGER = 0.8, 4
+# The failure of a wall of which no case tells anything.
+_NO_CONTACT = "cannot be told: in no case is the device still at the wall after {0:g} s"
 # Members that are worth a worker of their own.
 _PART = 150
 
@@ -45,7 +47,7 @@ class Failure:
     """What a wall does in the case that it does not bear.
 
     Attributes:
-        case: in words.
+        case: in words; or why it cannot be told, with a frequency of 0.
         at_s: end of the stretch in which it was seen.
         gone: whether the device left its limits; the numbers are of no meaning then.
         motion_m, force_N, frequency_Hz, times_felt, by_force: of that stretch, as of ``Buzz``.
@@ -197,18 +199,21 @@ def run_jobs(jobs: Sequence[Job]) -> list[Failure | None]:
         seed = job.loop.seed + place
         scenes.append(replace(made[id(job.loop), case], seed=seed, wall=held, dissipation=wall.elements))
     failed: dict[int, Failure] = {}
+    touched: set[int] = set()
     felt = {id(job.loop): job.loop for job in jobs}
     thresholds = {of: felt_force_N(loop) for of, loop in felt.items()}
     for group, loops in make_loops(scenes, installed_kinds()):
-        _watch(jobs, loops, [members[index] for index in group], failed, thresholds)
-    return [failed.get(index) for index in range(len(jobs))]
+        _watch(jobs, loops, [members[index] for index in group], failed, touched, thresholds)
+    from_s = FROM_S * slowness(jobs[0].loop)
+    untold = Failure(_NO_CONTACT.format(from_s), from_s, gone=False)
+    return [failed.get(index, None if index in touched else untold) for index in range(len(jobs))]
 
 
 def _watch(
     jobs: Sequence[Job], loops: Loops | LoneLoop, members: list[tuple[int, int]], failed: dict[int, Failure],
-    thresholds: Mapping[int, Threshold],
+    touched: set[int], thresholds: Mapping[int, Threshold],
 ) -> None:  # fmt: skip
-    """Follows loops to their end, or until every wall among them has failed."""
+    """Follows loops to their end, or until every wall among them has failed; adds those at which one still is."""
     rate, late = jobs[0].loop.clock.control_rate, slowness(jobs[0].loop)
 
     def felt_N(frequency_Hz: np.ndarray) -> np.ndarray:
@@ -235,6 +240,8 @@ def _watch(
             failed.update((wall, Failure(jobs[wall].cases[case].words, 0.0, gone=True)) for wall, case in members)
             return
         bad, found = seen.gone, None
+        if stretch >= first:
+            touched.update(members[place][0] for place in np.flatnonzero((seen.command != 0.0).any(axis=0)))
         if stretch >= first and not bad.all():
             found = buzz(seen.x, seen.measured, seen.command, rate, felt_N)
             felt, is_last = found.times_felt >= 1.0, stretch == _LONGER * usual - 1
