@@ -14,8 +14,8 @@ from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
-# For so many ticks of members in all.
-LOOPS = WhereItPays("haploop.plant.friction.projected_loops", 1_000_000)
+# For so many ticks of members in all, half a second of them by NumPy.
+LOOPS = WhereItPays("haploop.plant.friction.projected_loops", 200_000)
 
 
 class ProjectedFrictionMotion(ChainMotion):
