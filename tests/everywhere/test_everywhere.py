@@ -22,6 +22,13 @@ def test_trajectories_keep_every_bit_whatever_kernels_vector_units_and_c_library
 
 
 @pytest.mark.slow
+def test_what_depends_on_linear_algebra_passes_with_the_oldest_kernels():
+    oldest = next(each for each in of_the_machine() if each.name == OTHERS[0])
+    passed, words = command.tested(oldest, HERE, ["tests/estimators", "tests/linear", "tests/search"])
+    assert passed, words
+
+
+@pytest.mark.slow
 def test_a_test_that_fails_in_a_variant_is_named(tmp_path):
     (tmp_path / "test_it.py").write_text(
         "import os\ndef test_the_kernel_is_not_named(): assert 'OPENBLAS_CORETYPE' not in os.environ\n"
@@ -50,7 +57,7 @@ def test_a_python_that_is_not_there_is_told_and_not_guessed(tmp_path):
 
 def test_the_lowest_of_every_direct_dependency_is_what_the_project_allows_in_its_extras_too():
     pins = lowest_direct()
-    assert {"numpy==2.0", "numba==0.61", "fmpy==0.3.22"} <= {*pins}
+    assert {"numpy==2.1.3", "numba==0.61", "fmpy==0.3.24"} <= {*pins}
     assert all(re.fullmatch(r"[\w-]+==[\d.]+", pin) for pin in pins)
 
 

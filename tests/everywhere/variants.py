@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import shutil
 import subprocess
@@ -113,6 +114,9 @@ def _project() -> dict[str, Any]:
 
 def lowest_direct() -> list[str]:
     """Returns the lowest version that is allowed of every direct dependency, those of extras among them, as pins."""
-    extras = [need for needs in _project()["optional-dependencies"].values() for need in needs]
-    found = [_NEED.match(need) for need in (*_project()["dependencies"], *extras)]
-    return [f"{each[1]}=={each[2]}" for each in found if each]
+    pins: list[str] = []
+    for need in (*_project()["dependencies"], *itertools.chain(*_project()["optional-dependencies"].values())):
+        bound = _NEED.match(need)
+        assert bound, f"{need} has no lower bound"
+        pins.append(f"{bound[1]}=={bound[2]}")
+    return pins

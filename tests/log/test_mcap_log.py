@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import io
 import struct
 import tracemalloc
@@ -124,7 +125,9 @@ def test_one_message_can_be_found_by_time_through_the_index(tmp_path: Path) -> N
     log = (tmp_path / "log.mcap").read_bytes()
     reader = make_reader(io.BytesIO(log))
     at = 77 * 1_000_000
-    found = list(reader.iter_messages(topics=["/controller"], starting_at=at, ending_at=at))
+    is_old = "starting_at" not in inspect.signature(reader.iter_messages).parameters  # mcap before 1.6
+    span: dict[str, Any] = {"start_time": at, "end_time": at + 1} if is_old else {"starting_at": at, "ending_at": at}
+    found = list(reader.iter_messages(topics=["/controller"], **span))
     assert [message.log_time for _, _, message in found] == [at]
     # The index entries point at the message records themselves: opcode, length and channel stand there.
     summary = reader.get_summary()

@@ -1,6 +1,7 @@
 """The cost of a scene, counted and not timed, effect by effect: bytecode instructions of the loop.
 
-A count is the same on every machine. A call into NumPy counts as one instruction, whatever the size of its arrays.
+A count is the same on every machine with the same version of CPython. A call into NumPy counts as one instruction,
+whatever the size of its arrays.
 """
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ import statistics
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from types import FrameType
-from typing import TYPE_CHECKING, Any
+from threading import get_ident
+from types import CodeType, FrameType
+from typing import TYPE_CHECKING, Any, Self
 
 from haploop.controller.controller import Controller
 from haploop.launch.plan.effect import Effect
@@ -28,6 +30,8 @@ Kinds = dict[str, type["Element"]]
 WHOLE, AGAIN, NONE = "all effects", "all effects again", "no effect"
 # Exchanges that are left out, since they build caches, and exchanges that are counted.
 _FIRST, _COUNTED = 20, 101
+# A number of tools that nobody else has: a debugger, coverage and a profiler are 0 to 2.
+_TOOL = 3
 
 
 @dataclass(frozen=True)
@@ -45,21 +49,44 @@ class Operations:
 
 
 class _Counter:
-    """A trace function that counts every instruction outside this file."""
+    """Counts every instruction of this thread outside this file, while it is entered."""
 
     def __init__(self) -> None:
-        self.count = 0
+        self._count, self._thread = 0, get_ident()
 
-    def __call__(self, frame: FrameType, event: str, _argument: Any) -> Any:
+    def __enter__(self) -> Self:
+        self._before = sys.gettrace()
+        if sys.version_info >= (3, 12):
+            # A trace function would count what it has seen before otherwise than what it has not.
+            events = sys.monitoring
+            events.use_tool_id(_TOOL, "haploop")
+            events.register_callback(_TOOL, events.events.INSTRUCTION, self._note)
+            events.set_events(_TOOL, events.events.INSTRUCTION)
+        else:
+            sys.settrace(self._trace)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if sys.version_info >= (3, 12):
+            sys.monitoring.set_events(_TOOL, 0)
+            sys.monitoring.register_callback(_TOOL, sys.monitoring.events.INSTRUCTION, None)
+            sys.monitoring.free_tool_id(_TOOL)
+        else:
+            sys.settrace(self._before)
+
+    def _note(self, code: CodeType, _offset: int) -> None:
+        self._count += code.co_filename != __file__ and get_ident() == self._thread
+
+    def _trace(self, frame: FrameType, event: str, _argument: Any) -> Any:
         if frame.f_code.co_filename == __file__:
             return None
         frame.f_trace_opcodes, frame.f_trace_lines = True, False
-        self.count += event == "opcode"
-        return self
+        self._count += event == "opcode"
+        return self._trace
 
     def take(self) -> int:
         """Returns the count since the last call."""
-        count, self.count = self.count, 0
+        count, self._count = self._count, 0
         return count
 
 
@@ -81,12 +108,8 @@ def operations(scene: Scene, kinds: Kinds) -> Operations:
 
     ticks = time.lookahead_ticks + 1
     end = min((_FIRST + _COUNTED) * ticks, time.ticks)
-    before = sys.gettrace()
-    sys.settrace(counter)
-    try:
+    with counter:
         plant.run_until(end, exchange)
-    finally:
-        sys.settrace(before)
     counted = counts[min(_FIRST, len(counts) // 2) :]
     by_plant, by_controller = (statistics.median_low(column) for column in zip(*counted, strict=True))
     return Operations(by_plant, by_controller, ticks)

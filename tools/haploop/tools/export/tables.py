@@ -2,7 +2,8 @@
 
 CSV: UTF-8, one header line, ``timestamp (s),x (m)``; a pure number has its name alone. Numbers have as many digits as
 it takes to read back the same float64, a NaN is an empty cell, an infinite number is ``inf`` or ``-inf``. So one call
-of ``pandas.read_csv``, or a double click on the file, does.
+of ``pandas.read_csv``, or a double click on the file, does; pandas before 3 rounds the last bit of some numbers, unless
+told ``float_precision="round_trip"``.
 
 Parquet: float64 columns; ``pyarrow.parquet.read_schema(file).field("x").metadata[b"unit"]`` is the unit of a column;
 pandas and polars read the files as they are.
