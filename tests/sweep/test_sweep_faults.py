@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Callable
@@ -205,15 +206,22 @@ def test_a_plugin_that_kills_its_worker_in_one_cell_is_one_row(
 
 
 @pytest.mark.slow
-def test_on_a_dask_cluster_the_table_is_the_same(launched: Callable[..., Launched], tmp_path: Path) -> None:
+def test_on_a_dask_cluster_of_which_a_worker_is_killed_the_table_is_the_same(
+    launched: Callable[..., Launched], tmp_path: Path
+) -> None:
     distributed = pytest.importorskip("distributed")
-    whole = swept(tmp_path, out=tmp_path / "whole")
+    few = SLOW.replace("480", "120")
+    whole = swept(tmp_path, few, SLOW_PRESS, out=tmp_path / "whole")
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"
     ) as cluster:
         out = tmp_path / "out"
         run = launched("sweep", str(tmp_path / "sweep.toml"), "--dask", cluster.scheduler_address, out=out)
+        wait_for("a part", lambda: parts(out) or not run.is_there())
+        killed = next(iter(cluster.workers.values())).pid
+        os.kill(killed, signal.SIGKILL)
         run.end(0)
+        assert killed not in [worker.pid for worker in cluster.workers.values()]
     table = read(out)
     assert {name: column.tolist() for name, column in table.columns.items()} == {
         name: column.tolist() for name, column in whole.columns.items()

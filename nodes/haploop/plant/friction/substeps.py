@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -62,7 +63,8 @@ def moved(
 ) -> None:  # fmt: skip
     """Fills in states by a transition."""
     table = tables[of[0]][of[1]]
-    change = np.add.reduce(table * np.array((*z, command, friction, load, rise))[:, None]) + z_comp
+    change = np.add.reduce(table * np.array((*z, command, friction, load, rise))[:, None])
+    change += z_comp
     np.add(z, change, out=after)
     np.subtract(change, after - z, out=comp)
 
@@ -232,7 +234,8 @@ def pieces_record(chain: Chain, pieces: list[Any]) -> dict[str, np.ndarray]:
     """
     names = ["step", "level", "stuck", "friction", "load", "snap_J", *chain.states]
     names += [f"{name}_low" for name in chain.positions]
-    rows = np.concatenate([np.zeros((0, len(names))), *(np.reshape(of, (-1, len(names))) for of in pieces)])
+    tables = [[np.array([*of])] if kind is list else [*of] for kind, of in groupby(pieces, type)]
+    rows = np.concatenate([np.zeros((0, len(names))), *(table for of in tables for table in of)])
     return {f"pieces.{name}": np.ascontiguousarray(rows[:, i]) for i, name in enumerate(names)}
 
 
