@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 STRIBECK = {"kinetic": 0.03, "breakaway": 0.05, "stribeck_velocity": 0.01}
 SCENES: dict[str, dict[str, Any]] = {
     "one mass": {},
-    "a slow actuator": {"also": ("bandwidth", "transmission")},
+    "as many states as there can be": {"also": ("transmission", "grip", "bandwidth", "accelerometer")},
     "a cable and a grip": {"also": ("transmission", "grip")},
     "breakaway": {"friction": {"kinetic": 0.03, "breakaway": 0.06}},
     "Stribeck": {"friction": STRIBECK, "also": ("transmission", "bandwidth")},

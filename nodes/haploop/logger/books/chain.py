@@ -72,7 +72,7 @@ class ChainBooks:
         loops = LOOPS.module_for(dx.size) if dx.ndim == 1 or self._rubs else None
         if loops and (found := self._by_loops(loops, first_step, columns, tau, dx.size // len(dx))) is not None:
             return self._completed(found.reshape(-1, *dx.shape), columns["force"][:-1], dx, commanded)
-        if not columns.get("pieces"):
+        if "pieces" not in columns or not len(columns["pieces"][0]):
             return self._of_run(first_step, columns, tau, dx, commanded)
         return self._with_cut_steps(first_step, columns, tau, dx, list(commanded))
 
@@ -82,16 +82,11 @@ class ChainBooks:
         """Returns what ``books_by_step`` of the loops does; None where these cannot serve."""
         chain, steps = self._chain, len(tau) - 1
         names = [*chain.states, *(f"{name}_low" for name in chain.positions), "friction", "stuck"]
-        of_each = columns.get("pieces") if columns["x"].ndim > 1 else [(0, columns)]
-        of_each = [(place, of) for place, of in of_each or () if len(of.get(f"{PIECES}step", ()))]
-        pieces, counts = np.zeros((len(names) + 3, 0)), np.zeros(members, np.int64)
-        if of_each:
-            parts = [
-                np.concatenate([of[PIECES + name] for _, of in of_each]) for name in (*names, "step", "level", "snap_J")
-            ]
-            pieces = np.stack(parts)
-            pieces[len(names)] -= first_step
-            counts[[place for place, _ in of_each]] = [len(of[f"{PIECES}step"]) for _, of in of_each]
+        places, some, of_pieces = columns.get("pieces") or ([0], [len(columns.get(f"{PIECES}step", ()))], columns)
+        counts, none = np.zeros(members, np.int64), np.zeros(0)
+        counts[places] = some
+        pieces = np.stack([of_pieces.get(PIECES + name, none) for name in (*names, "step", "level", "snap_J")])
+        pieces[len(names)] -= first_step
         kinds = np.flatnonzero(np.bincount((2 * pieces[-2] + pieces[len(names) - 1]).astype(np.int64)))
         if (forms := self._forms.for_loops(kinds, loops)) is None:
             return None
@@ -120,10 +115,8 @@ class ChainBooks:
     def _with_cut_steps(
         self, first_step: int, columns: BatchColumns, tau: np.ndarray, dx: np.ndarray, commanded: list[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        pieces, rows, shape = columns["pieces"], len(dx) + 1, columns["x"].shape
-        places = [place for place, _ in pieces]
-        whole = {name: column for name, column in columns.items() if np.shape(column) == shape}
-        in_order = [(at, cut) for at, (_, cut) in enumerate(pieces)]
+        (places, *pieces), rows, shape = columns["pieces"], len(dx) + 1, columns["x"].shape
+        whole = {name: column for name, column in columns.items() if getattr(column, "shape", ()) == shape}
 
         def joined(values: np.ndarray) -> np.ndarray:
             """Returns a column of all steps of those members, one member after the other; 0 between them."""
@@ -131,7 +124,7 @@ class ChainBooks:
             column[:, : len(values)] = np.broadcast_to(values, (len(values), shape[1]))[:, places].T
             return column.ravel()
 
-        cut = end_to_end(first_step, {name: column[:, places] for name, column in whole.items()}, in_order)
+        cut = end_to_end(first_step, {name: column[:, places] for name, column in whole.items()}, *pieces)
         anew = self._of_run(0, cut, joined(tau), joined(dx)[:-1], [joined(force)[:-1] for force in commanded])
         others = np.setdiff1d(np.arange(shape[1]), places)
         tau_of, dx_of, *forces = (part if part.shape[-1] == 1 else part[:, others] for part in (tau, dx, *commanded))

@@ -10,8 +10,8 @@ from haploop.protocol.machine_code import MachineCode
 
 _code = MachineCode(__file__, ())
 _inlined = partial(_code.compiled, inlined=True)
-# Integrals of products that are summed side by side; no chain has more.
-_PRODUCTS = 8
+# Integrals of products that are summed side by side: no chain has more, of dampers, links and the actuator.
+_PRODUCTS = 6
 
 
 @_inlined
@@ -33,15 +33,14 @@ def _rates_of(rates, lags, acting, rise, w):  # pragma: no cover
 
 @_inlined
 def _products_of(forms, w, found):  # pragma: no cover
-    a, b, c, d, e, f, g, h = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    pair = 0
+    a, b, c, d, e, f, pair = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
     for i in range(len(w)):
         for j in range(i, len(w)):
             both, of = w[i] * w[j], forms[pair]
-            a, b, c, d = a + of[0] * both, b + of[1] * both, c + of[2] * both, d + of[3] * both
-            e, f, g, h = e + of[4] * both, f + of[5] * both, g + of[6] * both, h + of[7] * both
+            a, b, c = a + of[0] * both, b + of[1] * both, c + of[2] * both
+            d, e, f = d + of[3] * both, e + of[4] * both, f + of[5] * both
             pair += 1
-    found[0], found[1], found[2], found[3], found[4], found[5], found[6], found[7] = a, b, c, d, e, f, g, h
+    found[0], found[1], found[2], found[3], found[4], found[5] = a, b, c, d, e, f
 
 
 @_inlined

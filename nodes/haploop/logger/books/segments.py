@@ -109,23 +109,21 @@ class Segments:
         return groups
 
 
-def end_to_end(first_step: int, columns: Columns, pieces: list[tuple[int, Columns]]) -> Columns:
+def end_to_end(first_step: int, columns: Columns, counts: Sequence[int], pieces: Columns) -> Columns:
     """Returns the telemetry of several members as if it were that of one run, member after member.
 
     Args:
         columns: shape (steps + 1, members).
-        pieces: the columns of pieces of every member by its place, in order of the places.
+        counts: how many pieces each of them has.
+        pieces: the columns of all pieces, member after member.
 
     Returns:
         Columns whose first step is 0. Every (steps + 1)-th step leads from the end of a member to the start of the next
         and has no meaning.
     """
-    rows = len(columns["x"])
     joined = {name: column.T.ravel() for name, column in columns.items()}
-    of_steps = [of[f"{PIECES}step"] - first_step + place * rows for place, of in pieces]
-    for name in pieces[0][1]:
-        joined[name] = np.concatenate([of[name] for _, of in pieces])
-    return joined | {f"{PIECES}step": np.concatenate(of_steps)}
+    before = np.repeat(len(columns["x"]) * np.arange(len(counts)) - first_step, counts)
+    return joined | pieces | {f"{PIECES}step": pieces[f"{PIECES}step"] + before}
 
 
 def _in_order(steps: int, step_of_piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -241,20 +241,25 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         for part, of_this in zip(interval, one.take_interval(), strict=True):
             part[..., place] = of_this
         if pieces := one.take_pieces():
-            self._pieces.append((place, pieces))
+            self._pieces.append((place, np.array(pieces)))
         assert one.state.mode
         return one.state.mode
 
     def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, Any]:
-        """Returns the record as without friction, and beside it ``pieces``: (member, its pieces) where it has any."""
+        """Returns the record as without friction, and beside it ``pieces``, member by member.
+
+        These are (members that have any, how many each, ``pieces_record`` of all of them one after the other).
+        """
         pieces, self._pieces = self._pieces, []
         record = super().take_record(tick, positions_only=positions_only)
         if positions_only:
             return record
         of_place = dict[int, list[Any]]()
-        for place, rows in pieces:
+        for place, rows in sorted(pieces, key=lambda piece: piece[0]):
             of_place.setdefault(place, []).append(rows)
-        return record | {"pieces": [(place, pieces_record(self.chain, of_place[place])) for place in sorted(of_place)]}
+        counts = [sum(map(len, parts)) for parts in of_place.values()]
+        tables = [rows for parts in of_place.values() for rows in parts]
+        return record | {"pieces": (np.array([*of_place], np.intp), counts, pieces_record(self.chain, tables))}
 
     def forget_record(self) -> None:
         super().forget_record()
