@@ -164,3 +164,10 @@ def test_a_number_that_cannot_be_one_is_refused_in_the_words_of_the_program(word
     assert result.exit_code == 2
     assert f"{words[1].replace('-1', '-1.0')}" in result.stderr
     assert result.stderr.startswith(f"A {words[0]} ")
+
+
+def test_the_help_of_run_is_all_that_a_process_of_it_writes() -> None:
+    """Not only within this process: what is started early must not be taken for something else at the end."""
+    done = subprocess.run([sys.executable, "-m", "haploop.tools.cli", "run", "--help"], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("Usage:")

@@ -25,10 +25,16 @@ def main() -> None:
 
             ask_for_one_thread(os.environ)
             early = _started(sys.argv[1:])
+            os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # a search through all packages for none
             from haploop.tools.cli.app import app
+
+            # Typer makes every command that it has, a fifth of what it takes, to call the one that is asked for.
+            app.registered_commands = [
+                command for command in app.registered_commands if command.name in sys.argv[1:2]
+            ] or app.registered_commands
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         _refuse_what_is_no_text(sys.argv[1:])
-        app(obj=early)
+        app(obj={"early": early})  # typer puts things of its own beside it
     except OSError as error:  # one that no command has words of its own for
         print(f"{error.filename or 'A file'} cannot be used: {error.strerror or error}.", file=sys.stderr)
         sys.exit(1)

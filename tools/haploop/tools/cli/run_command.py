@@ -105,7 +105,7 @@ def run(
                 summary = start.run(
                     prepared,
                     in_process=in_process,
-                    early=context.obj,
+                    early=(context.obj or {}).get("early"),
                     pace=math.inf if rate == "free" else rate,
                     clock=clock,
                     transport=transport,
