@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from haploop.launch.clock.clock import MOST_CHANGES, Clock, ClockError
+from haploop.launch.clock.clock import Clock, ClockError
 from haploop.launch.scene.mistakes import SceneError
 from helpers.runs.clocks import DAMPING, SWAP, clock, granted, sent
 
@@ -90,20 +90,23 @@ def test_a_change_that_was_refused_is_not_settled_as_made() -> None:
     assert stiffness(subject, subject.until) == 150.0
 
 
-def test_what_changed_before_costs_a_further_change_nothing_and_what_waits_is_limited() -> None:
+def test_what_changed_before_costs_a_further_change_nothing_and_what_waits_is_limited(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("haploop.launch.clock.clock.MOST_CHANGES", 20)
     subject = clock()
-    for tick in range(150):
+    for tick in range(40):
         subject.until = tick
         subject.change({"set": {"wall.stiffness": 100.0 + tick}})
         subject.settle(tick)
     assert len(subject._scene.event) == 1
-    for _ in range(MOST_CHANGES - 1):
+    for _ in range(19):
         subject.change({"set": {"wall.stiffness": 100.0}})
-    with pytest.raises(ClockError, match="100 changes wait"):
+    with pytest.raises(ClockError, match="20 changes wait"):
         subject.change({"set": {"wall.stiffness": 100.0}})
-    subject.settle(150)
-    subject.until = 151
-    assert subject.change({"set": {"wall.stiffness": 100.0}}) == 151
+    subject.settle(40)
+    subject.until = 41
+    assert subject.change({"set": {"wall.stiffness": 100.0}}) == 41
 
 
 @pytest.mark.parametrize(
