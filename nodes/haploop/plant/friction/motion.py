@@ -220,13 +220,12 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         forced: np.ndarray,
     ) -> np.ndarray:  # fmt: skip
         """Lets some members, of which all stick or all slip, follow their mode; returns which of them it holds for."""
-        some = Interval(*(np.ascontiguousarray(part[..., places]) for part in interval))
+        some = Interval.of(np.ascontiguousarray(interval.course[..., places]), len(self.state.z))
         friction = slipping(self._stick_slip, mode)
         follow((self._clamped if mode.is_stuck else self._free).held, forced, some, 0, holds, friction)
         some.held[:, 2], some.held[:, 3] = friction, mode.is_stuck
         some.at_ends[:, 0], some.at_ends[:, 1] = friction, mode.is_stuck
-        for part, of_these in zip(interval, some, strict=True):
-            part[..., places] = of_these
+        interval.course[..., places] = some.course
         return np.all(self._one.holds_in_steps(mode, some, 0, friction, loads), axis=0)
 
     def _solve(
@@ -238,8 +237,7 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         held, mode = one.state.held, tree_member(state.mode, place)
         one.state = ChainState(state.z[:, place].copy(), state.z_comp[:, place].copy(), held, one.state.sensed, mode)
         one.advance_under(loads, forced, tick, holds)
-        for part, of_this in zip(interval, one.take_interval(), strict=True):
-            part[..., place] = of_this
+        interval.course[..., place] = one.take_interval().course
         if pieces := one.take_pieces():
             self._pieces.append((place, np.array(pieces)))
         assert one.state.mode
@@ -250,16 +248,14 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
 
         These are (members that have any, how many each, ``pieces_record`` of all of them one after the other).
         """
-        pieces, self._pieces = self._pieces, []
+        pieces, self._pieces = sorted(self._pieces, key=lambda piece: piece[0]), []
         record = super().take_record(tick, positions_only=positions_only)
         if positions_only:
             return record
-        of_place = dict[int, list[Any]]()
-        for place, rows in sorted(pieces, key=lambda piece: piece[0]):
-            of_place.setdefault(place, []).append(rows)
-        counts = [sum(map(len, parts)) for parts in of_place.values()]
-        tables = [rows for parts in of_place.values() for rows in parts]
-        return record | {"pieces": (np.array([*of_place], np.intp), counts, pieces_record(self.chain, tables))}
+        members, tables = np.array([place for place, _ in pieces], np.intp), [rows for _, rows in pieces]
+        counts = np.bincount(members, [len(rows) for rows in tables]).astype(np.intp)
+        places = np.flatnonzero(counts)
+        return record | {"pieces": (places, counts[places], pieces_record(self.chain, tables))}
 
     def forget_record(self) -> None:
         super().forget_record()
