@@ -72,6 +72,22 @@ def test_loops_with_friction_share_an_array_though_each_hand_presses_otherwise(v
     assert together(scenes) == [alone(each) for each in scenes]
 
 
+@pytest.mark.parametrize("effects", [(), ("transmission",)])
+def test_so_they_do_though_each_has_a_friction_of_its_own_and_some_leave(effects: tuple[str, ...]) -> None:
+    """The first is thrown beyond its limit, and the others go on with the friction that is theirs."""
+    base = tap(("friction", *effects), duration=0.1)
+    scenes = [
+        replace(base, friction=Friction(kinetic=kinetic, breakaway=kinetic + more))
+        for kinetic, more in ((0.01, 0.0), (0.02, 0.02), (0.2, 0.001), (0.6, 0.3))
+    ]
+    scenes = [replace(scene, diverged_beyond=1e-3 if at < 2 else 1.0) for at, scene in enumerate(scenes)]
+    assert len({structure(each) for each in scenes}) == 1
+    expected = [alone(each) for each in scenes]
+    assert len({result["ended"] for result in expected}) == 2
+    assert len({result["energy"]["friction_heat_J"] for result in expected}) == 4
+    assert together(scenes) == expected
+
+
 @pytest.mark.slow
 def test_loops_with_friction_that_diverge_disturb_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     """In blocks of a tick, and in blocks in which many loops switch."""

@@ -10,6 +10,7 @@ import pytest
 
 from haploop.logger.books import segments
 from haploop.plant.friction import motion
+from haploop.protocol.scene.effects import Friction
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Scene
 from helpers.runs.batches import alone, together, with_stiffness
@@ -62,7 +63,10 @@ def test_so_has_a_batch_whatever_room_there_is_for_the_pieces(
     room: int | None, loops: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     base = scene_of("a cable and a grip")
-    scenes = [replace(with_stiffness(base, k), seed=i) for i, k in enumerate((60.0, 700.0, 2900.0))]
+    scenes = [
+        replace(with_stiffness(base, k), seed=i, friction=Friction(kinetic=0.04 - 0.01 * i, breakaway=0.05 + 0.01 * i))
+        for i, k in enumerate((60.0, 700.0, 2900.0))
+    ]
     expected = by(np.inf, monkeypatch, scenes)
     assert all(result["energy"]["friction_heat_J"] > 1e-5 for result in expected)
     if room:

@@ -17,9 +17,9 @@ from haploop.protocol.ticks import DELAY
 # What says nothing of what is simulated.
 _ASIDE = ("title", "seed", "run")
 _TIMES = ("clock", "duration", "at", "delay")
-# Members with friction have the same bodies; the hand may press as it likes.
+# Members with friction have the same bodies; the hand may press, and friction measure, as it likes.
 _PRESSES = "force"
-_BODIES = ("device", "hand", "transmission", "friction", "actuator", "accelerometer")
+_BODIES = ("device", "hand", "transmission", "actuator", "accelerometer")
 
 
 def is_batchable(scene: Scene) -> bool:
@@ -39,7 +39,7 @@ def structure(scene: Scene) -> Hashable:
     """Returns what scenes that are stacked must have in common: all but the values of their numbers.
 
     Times are common, too: the clock, the duration, delays, when events come, the points of a recorded force. So is
-    whether a number is 0, which may mean that something is not there, and where there is friction all that moves.
+    whether a number is 0, which may mean that something is not there, and where there is friction all bodies.
     """
     return next(structures([scene]))
 

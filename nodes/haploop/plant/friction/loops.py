@@ -111,12 +111,27 @@ def _row(rows, at):  # pragma: no cover
 
 @_code.compiled
 def _advance(
-    numbers, rows, whole, tables, held, free, clamped, loads, ends, first_step, courses, modes, pieces, upto, member
+    mass_kg,
+    speed_up,
+    rows,
+    whole,
+    tables,
+    held,
+    laws,
+    free,
+    clamped,
+    loads,
+    ends,
+    first_step,
+    courses,
+    modes,
+    pieces,
+    upto,
+    member,
 ):  # pragma: no cover
     """Moves members through an interval, from one on; returns the first one whose pieces there is no room for."""
     members, n, size = courses.shape[2], courses.shape[0] - 1, tables.shape[2]
-    law = stick_slip.Friction(numbers[0], numbers[1], numbers[2], numbers[3])
-    of = StickSlip(law, whole[0], numbers[4], numbers[5], _row(rows, 0), _row(rows, 1))
+    force, change = _row(rows, 0), _row(rows, 1)
     halving, room = substeps.Halving(whole[1], whole[2]), np.empty((5, size))
     some, load, forced = (
         np.empty((_TOGETHER, n + 1, 2 * size + 6)),
@@ -137,6 +152,9 @@ def _advance(
             if free.shape[2] > 1 or not at:
                 place = min(m, free.shape[2] - 1)
                 forced[0], forced[1] = free[:, :, place], clamped[:, :, place]
+            law = min(m, laws.shape[1] - 1)
+            rubs = stick_slip.Friction(laws[0, law], laws[1, law], laws[2, law], laws[3, law])
+            of = StickSlip(rubs, whole[0], mass_kg, speed_up, force, change)
             mode = StickSlipState(modes[0, m] > 0.0, modes[1, m])
             mode = _walk(
                 of,
@@ -169,7 +187,7 @@ def _advance(
 
 
 class Loops:
-    """Intervals of one chain, or of a batch that shares it.
+    """Intervals of one chain, or of a batch that shares it; the law of friction is handed in.
 
     Args:
         tables: transitions over h / 2^level by whether body 0 is stuck and by level, (2, levels, states + 4, states).
@@ -179,19 +197,19 @@ class Loops:
     def __init__(
         self, of: StickSlip, halving: substeps.Halving, whole_steps: bool, tables: np.ndarray, held: np.ndarray
     ) -> None:
-        numbers, rows = np.array([*of.law, of.mass_kg, of.speed_up]), np.zeros((2, STATES + 2))
+        rows = np.zeros((2, STATES + 2))
         for row, (of_states, *others) in zip(rows, (of.force, of.change), strict=True):
             row[-2:] = others
             for i, factor in of_states:
                 row[i] = factor
         of_each_state = np.ascontiguousarray(tables.swapaxes(2, 3)), np.ascontiguousarray(held.transpose(0, 2, 3, 1))
-        self._system = numbers, rows, np.array([of.v, *halving, whole_steps]), *of_each_state
+        self._system = of.mass_kg, of.speed_up, rows, np.array([of.v, *halving, whole_steps]), *of_each_state
         self._pieces = np.empty((_PIECES + 1, 6 + tables.shape[-1] + of.v))
         self._ends = dict[tuple[int, ...], np.ndarray]()
 
     def advance(
         self, course: np.ndarray, forced: tuple[np.ndarray, np.ndarray], loads: np.ndarray, holds: list[Hold],
-        first_step: int, modes: np.ndarray,
+        first_step: int, modes: np.ndarray, laws: np.ndarray,
     ) -> list[tuple[int, np.ndarray]] | None:  # fmt: skip
         """Moves all members through an interval, whose first plant step is numbered; changes their modes in place.
 
@@ -201,6 +219,7 @@ class Loops:
             forced: responses to the loads while body 0 slips and while it sticks, shape (n + 1, states, 1 or members).
             loads: shape (n + 1, 1 or members), N.
             modes: whether body 0 sticks, and its direction, shape (2, members).
+            laws: the numbers of ``Friction``, shape (4, 1 or members).
 
         Returns:
             (member, rows of its pieces) of those that have any; None where one switches too often for the loops: the
@@ -214,7 +233,7 @@ class Loops:
         while begun < members:
             pieces[-1, 0] = 0.0
             member = _advance(
-                *self._system, *forced, loads, self._ends[counts], first_step, course, modes, pieces, upto, begun
+                *self._system, laws, *forced, loads, self._ends[counts], first_step, course, modes, pieces, upto, begun
             )
             if member == begun:
                 return None
@@ -238,4 +257,4 @@ def _try_out() -> None:
     of = StickSlip(stick_slip.Friction(1.0, 1.0, 0.0, 1.0), 1, 1.0, 1.0, row, row)
     loops = Loops(of, substeps.Halving(0, 1), True, np.zeros((2, 3, 6, 2)), np.zeros((2, 4, 1, 2)))
     forced = np.zeros((2, 2, 1)), np.zeros((2, 2, 1))
-    loops.advance(np.zeros((2, 10, 1)), forced, np.zeros((2, 1)), [(1, 0.0, 0)], 0, np.ones((2, 1)))
+    loops.advance(np.zeros((2, 10, 1)), forced, np.zeros((2, 1)), [(1, 0.0, 0)], 0, np.ones((2, 1)), np.ones((4, 1)))

@@ -10,6 +10,7 @@ from haploop.plant.chain.history import ChainState, Interval, StickSlipState
 from haploop.plant.chain.motion import ChainMotion, follow
 from haploop.plant.chain.transition import PIECE_TICKS, ChainTransition
 from haploop.plant.friction.stick_slip import (
+    Friction,
     RubbingHistory,
     StickSlip,
     decide_at_rest,
@@ -25,7 +26,7 @@ from haploop.plant.line import Hold
 from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.trees import tree_member, tree_take
+from haploop.protocol.trees import tree_member, tree_select, tree_take
 
 if TYPE_CHECKING:
     from haploop.plant.friction.loops import Loops
@@ -55,7 +56,12 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         self._tables = [
             ChainTransition(self.chain, self._step_s, self._n, stuck).halves(levels) for stuck in (False, True)
         ]
-        self._loops = self.loops_for(time.ticks)
+        self._loops, self._laws = self.loops_for(time.ticks), np.array(self.friction)[:, None]
+
+    def rub_by(self, law: Friction) -> StickSlip:
+        """Goes on by another law: of one member of a batch, or of some, for what is asked of them next."""
+        self._stick_slip = self._stick_slip._replace(law=law)
+        return self._stick_slip
 
     def loops_for(self, intervals: int) -> Loops | None:
         """Returns loops of machine code where they pay for so many intervals; they serve a batch of this chain, too."""
@@ -106,7 +112,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         free, clamped, loads = self._ahead
         of_this = (free[at], clamped[at]), loads[at * n : (at + 1) * n + 1]
         modes = np.array(((mode.is_stuck,), (mode.direction,)), float)
-        pieces = loops.advance(interval.course[..., None], *of_this, holds, tick * n, modes)
+        pieces = loops.advance(interval.course[..., None], *of_this, holds, tick * n, modes, self._laws)
         if pieces is None:
             return None
         self._pieces += [rows for _, rows in pieces]
@@ -166,7 +172,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
 
 
 class BatchFrictionMotion(RubbingHistory, ChainMotion):
-    """``FrictionMotion`` of the members of a batch with the same chain and the same friction; loads may differ.
+    """``FrictionMotion`` of the members of a batch with the same chain; loads and what friction measures may differ.
 
     In an interval all members go as far as they would if nothing switched, those that stick and those that slip apart.
     Most do. For each of the others the interval is solved anew by the motion of one run.
@@ -182,7 +188,11 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
 
     def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
         loads = np.broadcast_to(self.loads(0, 1)[0], z.shape[1:]).tolist()
-        held, modes = zip(*map(self._one.begun_under, z.T, loads), strict=True)
+        begun = []
+        for place, (start, load) in enumerate(zip(z.T, loads, strict=True)):
+            self._one.rub_by(tree_member(self.friction, place))
+            begun.append(self._one.begun_under(start, load))
+        held, modes = zip(*begun, strict=True)
         return np.stack(held, axis=-1), StickSlipState(*map(np.array, zip(*modes, strict=True)))
 
     def advance(self, tick: int, holds: list[Hold]) -> Any:
@@ -190,7 +200,8 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         forced = self._free.of_interval(tick), self._clamped.of_interval(tick)
         if self._loops and (mode := self.state.mode):
             modes = np.stack([mode.is_stuck, mode.direction])
-            found = self._loops.advance(interval.course, forced, loads, holds, tick * self._n, modes)
+            laws = np.stack(np.broadcast_arrays(*(np.atleast_1d(number) for number in self.friction)))
+            found = self._loops.advance(interval.course, forced, loads, holds, tick * self._n, modes, laws)
             if found is not None:
                 self._pieces += found
                 return self._accept(tick, interval, StickSlipState(modes[0] > 0.0, modes[1]))
@@ -221,7 +232,7 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
     ) -> np.ndarray:  # fmt: skip
         """Lets some members, of which all stick or all slip, follow their mode; returns which of them it holds for."""
         some = Interval.of(np.ascontiguousarray(interval.course[..., places]), len(self.state.z))
-        friction = slipping(self._stick_slip, mode)
+        friction = slipping(self._one.rub_by(tree_take(self.friction, places)), mode)
         follow((self._clamped if mode.is_stuck else self._free).held, forced, some, 0, holds, friction)
         some.held[:, 2], some.held[:, 3] = friction, mode.is_stuck
         some.at_ends[:, 0], some.at_ends[:, 1] = friction, mode.is_stuck
@@ -234,6 +245,7 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
     ) -> StickSlipState:  # fmt: skip
         """Takes one member through the interval alone; returns its mode at the end."""
         one, state = self._one, self.state
+        one.rub_by(tree_member(self.friction, place))
         held, mode = one.state.held, tree_member(state.mode, place)
         one.state = ChainState(state.z[:, place].copy(), state.z_comp[:, place].copy(), held, one.state.sensed, mode)
         one.advance_under(loads, forced, tick, holds)
@@ -264,3 +276,4 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
     def select(self, kept: np.ndarray) -> None:
         super().select(kept)
         self._clamped.select(kept)
+        self.friction = tree_select(self.friction, kept)
