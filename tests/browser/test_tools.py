@@ -79,6 +79,9 @@ def test_another_live_run_is_told_and_any_run_can_be_opened_or_drawn_over(stand_
     assert page.input_value("#run") == "abc123"
     opened = order(stand_in, page, lambda: page.select_option("#run", "def456"))
     assert opened == ("open", {"run": "def456"})
+    stand_in.tell({**RUNS, "shown": "fed987"})
+    expect(page.locator("#run option").last).to_have_text("fed987: ended")
+    assert page.input_value("#run") == "fed987", "what has ended is on show still"
     over = order(stand_in, page, lambda: page.select_option("#overlay", "wall-1"))
     assert over == ("overlay", {"run": "wall-1"})
 

@@ -47,6 +47,12 @@ export class Charts {
     this.panels.show(snapshot, state, marks);
   }
 
+  /** Draw what is out of sight, too. */
+  drawAll() {
+    for (const chart of [...Object.values(this.charts), ...this.panels.panels.own.charts]) chart.draw(true);
+    this.panels.panels.loops.drawAll();
+  }
+
   /** Fit all axes closely the next time: another stretch of time is looked at. */
   refit() {
     for (const { range } of Object.values(this.charts)) range.forget();

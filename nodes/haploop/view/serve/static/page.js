@@ -47,7 +47,10 @@ const setForm = new SetForm(steering);
 const runs = new RunChoice(steering);
 const scrubber = new Scrubber(viewport);
 const sound = new Sound(viewport);
-byId("save-picture").addEventListener("click", () => savePicture(state));
+byId("save-picture").addEventListener("click", () => {
+  charts.drawAll();
+  queueMicrotask(() => savePicture(state)); // after the charts, which draw in microtasks of their own
+});
 byId("save-data").addEventListener("click", () => snapshot && saveData(snapshot, state));
 // The address keeps the token: the jump is made here.
 byId("to-forms").addEventListener("click", (event) => {

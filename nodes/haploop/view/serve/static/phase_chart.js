@@ -87,8 +87,8 @@ export class PhaseChart {
     this.draw();
   }
 
-  draw() {
-    if (!this.isSeen) return;
+  draw(isWanted = this.isSeen) {
+    if (!isWanted) return;
     this.u.setData(this.data(), false);
     ["x", "y"].forEach((side, i) => this.u.setScale(side, { min: this.ranges[i].now[0], max: this.ranges[i].now[1] }));
   }

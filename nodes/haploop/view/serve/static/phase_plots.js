@@ -34,6 +34,10 @@ export class PhasePlots {
     this.momentum.show(momentum ? momentumLoops(momentum) : [], momentum ? "" : NO_INERTIA);
   }
 
+  drawAll() {
+    for (const chart of this.charts) chart.draw(true);
+  }
+
   /** Fit all axes closely the next time. */
   refit() {
     for (const { ranges } of this.charts) ranges.forEach((range) => range.forget());

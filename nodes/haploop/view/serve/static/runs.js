@@ -18,11 +18,13 @@ export class RunChoice {
   /** Follow what the viewer lists. */
   update(listing) {
     this.listing = listing;
-    const { live, past } = listing;
-    const known = JSON.stringify([live, past]);
+    const { live, past, shown } = listing;
+    // One that has ended stays on show, though nobody can open it again by this name.
+    const over = shown && ![...live, ...past].some(({ id }) => id === shown) ? [{ id: shown, title: "ended" }] : [];
+    const known = JSON.stringify([live, past, over]);
     if (known !== this.known) {
       this.known = known;
-      byId("run").replaceChildren(group(`live (${live.length})`, live), group("recorded, in runs/", past));
+      byId("run").replaceChildren(group(`live (${live.length})`, live), group("recorded, in runs/", past), ...(over.length ? [group("on show", over)] : []));
       byId("overlay").replaceChildren(make("option", { value: "" }, "no other run"), ...past.map(option));
       byId("runs").hidden = live.length + past.length === 0;
     }

@@ -135,8 +135,8 @@ export class TimeChart {
     this.range.follow(...extent(shown, this.options.zero && shown.length ? [0] : []));
   }
 
-  draw() {
-    if (!this.isSeen) return;
+  draw(isWanted = this.isSeen) {
+    if (!isWanted) return;
     this.u.setData([this.t, ...this.columns], false);
     this.u.setScale("x", { min: this.span[0], max: this.span[1] });
     this.tellSeldom();
