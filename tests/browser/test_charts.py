@@ -80,6 +80,20 @@ def test_a_line_goes_through_its_values_and_is_broken_where_there_are_none(stand
 
 
 @pytest.mark.slow
+def test_what_swings_faster_than_there_are_pixels_is_drawn_from_its_least_to_its_greatest(stand_in, page):
+    """Also beside a stretch without numbers, which stays empty."""
+    rows = [NAN if 700 < i < 900 else 0.01 * (i % 2) for i in range(1601)]
+    stand_in.show(positions(rows))
+    expect(page.locator("#position .legend button")).to_have_count(1)
+    page.wait_for_timeout(200)
+    *swings, gap = seen(page, "position", [0.1, 0.3, 0.9, 0.5], "ink")
+    assert gap is None
+    for first, last in swings:
+        assert abs(first - 0.07 / 1.14) < 0.03
+        assert abs(last - 1.07 / 1.14) < 0.03
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("into_wall", "solid"), [(-1.0, "below"), (1.0, "above")])
 def test_the_wall_is_shaded_on_the_side_of_its_material(into_wall, solid, stand_in, page):
     stand_in.state(wall={"position": 0.005, "stiffness": 150.0, "into_wall": into_wall})
