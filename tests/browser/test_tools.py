@@ -131,3 +131,17 @@ def test_the_change_panel_has_both_sides_and_says_what_is_not_held(stand_in, pag
     expect(page.locator("#compare")).not_to_contain_text("not held")
     row = page.locator("#compare tr:has-text('hand')")
     expect(row.locator("td")).to_have_text(["−2.00 mW", "−2.00 mW"])
+
+
+def test_a_choice_stands_at_what_it_is_and_has_no_slider(stand_in, page):
+    """Not at the first that there is, which would be set with the next number."""
+    free = dict.fromkeys(("at_least", "above", "at_most", "below"))
+    on = {**free, "unit": "", "choices": [False, True], "default": True}
+    kinds = {"mine": {"about": "", "parameters": {"on": on}}}
+    stiffness = OPTIONS["settable"]["wall.stiffness"]
+    settable = {"wall.stiffness": stiffness, "dissipation.0.on": {**on, "value": True}}
+    stand_in.state(options={"settable": settable, "kinds": kinds, "elements": [{"kind": "mine", "acts": "always"}]})
+    expect(page.locator("[id='set-dissipation.0.on']")).to_have_value("true")
+    expect(page.locator("#swap-on")).to_have_value("true")
+    expect(page.locator("#set-do")).to_be_disabled()
+    expect(page.locator("#set input[type=range]")).to_have_count(1)

@@ -70,10 +70,12 @@ export function strips(u, xs, ys) {
   return way > ROUGH * u.bbox.height ? found : null;
 }
 
-/** Draw strips as wide as a line; where they cover the same heights again and again, faintly within their edges. */
-export function drawStrips(u, found, width) {
+/** Draw strips as wide as a line, and dashed; where they cover the same heights again and again, faintly within edges. */
+export function drawStrips(u, found, { width, dash = [] }) {
   const { left, top, width: wide, height: tall } = u.bbox;
   const pen = width * devicePixelRatio;
+  const pattern = dash.flatMap((length, i) => Array(length).fill(i % 2 === 0));
+  const isGap = (x) => pattern[Math.floor((x - left) / devicePixelRatio) % pattern.length] === false;
   let [low, high, sum] = [Infinity, -Infinity, 0];
   for (let i = 0; i < found.length; i += 4) {
     if (found[i + 2] < low) low = found[i + 2];
@@ -89,6 +91,7 @@ export function drawStrips(u, found, width) {
     u.ctx.globalAlpha = part === "within" ? FAINT : 1;
     for (let i = 0; i < found.length; i += 4) {
       const [x, across, from, to] = [found[i], found[i + 1], found[i + 2] - pen / 2, found[i + 3] + pen / 2];
+      if (part !== "within" && isGap(x)) continue;
       const isThick = to - from > THICK * pen;
       if (part === "edges" && isThick) {
         u.ctx.fillRect(x, from, across, pen);

@@ -176,10 +176,10 @@ export class TimeChart {
     return u.ctx.restore();
   }
 
-  drawRough(u, found, { colour: name, width }) {
+  drawRough(u, found, line) {
     u.ctx.save();
-    u.ctx.fillStyle = colour(name);
-    drawStrips(u, found, width);
+    u.ctx.fillStyle = colour(line.colour);
+    drawStrips(u, found, line);
     u.ctx.restore();
   }
 
