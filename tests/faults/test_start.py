@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from haploop.launch.processes import children, deadlines, open_files
-from haploop.launch.processes.early import start_early, start_node
+from haploop.launch.processes.early import Started, start_early, start_node
 from haploop.launch.spec import OutputError, RunFailed
 from haploop.protocol.transport.messages import PROCESSES
 from helpers.live.launched import PATIENCE_S
@@ -87,13 +87,15 @@ def test_where_a_run_may_open_too_few_files_that_is_a_sentence(monkeypatch: pyte
 
 
 def test_the_processes_of_a_run_load_beside_their_launcher_but_for_those_it_may_not_need() -> None:
-    early = start_early(["run", "fig6c"])
+    early: dict[str, Started] = {}
+    for words in (["run", "fig6c", "--in-process"], ["run", "--node=plant=own", "fig6c"]):
+        start_early(words, early)
+        assert early == {}
+    start_early(["run", "fig6c"], early)
     assert early.keys() == PROCESSES.keys()
     for process in early.values():
         process.end()
         assert process.process.returncode == -signal.SIGKILL
-    for words in ([], ["check", "fig6c"], ["run", "fig6c", "--in-process"], ["run", "--node=plant=own", "fig6c"]):
-        assert start_early(words) == {}
 
 
 def test_a_process_that_is_told_of_no_run_ends_with_its_launcher() -> None:

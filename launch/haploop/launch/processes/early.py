@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from typing import NamedTuple
 
 from haploop.launch.processes.one_thread import ask_for_one_thread
@@ -76,17 +76,15 @@ def start_node(role: str) -> Started:
     return start_process((sys.executable, "-m", PROCESSES[role].module), environment, None, 0)
 
 
-def start_early(words: Sequence[str]) -> dict[str, Started]:
-    """Starts the processes of the run that a command line asks for, by role; those that it may not need are left."""
-    early: dict[str, Started] = {}
-    if words[:1] != ["run"] or any(word.startswith(_OTHERS) for word in words):
-        return early
+def start_early(words: Sequence[str], early: MutableMapping[str, Started]) -> None:
+    """Starts the processes of the run that a command line asks for, by role; none where it may need others."""
+    if any(word.startswith(_OTHERS) for word in words):
+        return
     for role in PROCESSES:
         try:
             early[role] = start_node(role)
         except OSError:  # told where it is started again
-            break
-    return early
+            return
 
 
 def _has_pidfd() -> bool:

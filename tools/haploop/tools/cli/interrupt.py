@@ -4,26 +4,38 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Mapping
+
+TYPE_CHECKING = False  # as that of typing, which takes longer to load than all else here
+if TYPE_CHECKING:
+    from haploop.launch.processes.early import Started
 
 SENTENCE = "Interrupted before anything began."
-
-
-def _leave(*_: object) -> None:
-    os.write(2, f"{SENTENCE}\n".encode())
-    os._exit(1)
 
 
 class LeavingAtOnce:
     """Has the two signals end the program while nothing is begun yet; a context manager, for the main thread.
 
     An exception raised by a signal within an import may be lost, or be shown with Python's own words.
+
+    Args:
+        processes: what is ended with the program.
     """
+
+    def __init__(self, processes: Mapping[str, Started] | None = None) -> None:
+        self._processes = {} if processes is None else processes
+
+    def _leave(self, *_: object) -> None:
+        os.write(2, f"{SENTENCE}\n".encode())
+        for started in self._processes.values():
+            started.process.kill()
+        os._exit(1)
 
     def __enter__(self) -> None:
         self._before = {}
         for number in (signal.SIGINT, signal.SIGTERM):
             try:
-                self._before[number] = signal.signal(number, _leave)
+                self._before[number] = signal.signal(number, self._leave)
             except ValueError:  # in another thread signals are somebody else's business
                 return
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from typing import TYPE_CHECKING
 
-from haploop.tools.cli.interrupt import SENTENCE, LeavingAtOnce
+from haploop.tools.cli.interrupt import SENTENCE, TYPE_CHECKING, LeavingAtOnce
 
 if TYPE_CHECKING:
     from haploop.launch.processes.early import Started
@@ -20,11 +19,14 @@ def main() -> None:
     """Runs the command line. Exit status: 0 done, 1 the run failed or was interrupted, 2 wrong usage or scene."""
     early: dict[str, Started] = {}
     try:
-        with LeavingAtOnce():
+        with LeavingAtOnce(early):
             from haploop.launch.processes.one_thread import ask_for_one_thread
 
             ask_for_one_thread(os.environ)
-            early = _started(sys.argv[1:])
+            if sys.argv[1:2] == ["run"]:  # what starts no processes loads no more for it
+                from haploop.launch.processes.early import start_early
+
+                start_early(sys.argv[1:], early)
             os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # a search through all packages for none
             from haploop.tools.cli.app import app
 
@@ -46,15 +48,6 @@ def main() -> None:
     finally:
         for process in early.values():  # that no run has taken
             process.end()
-
-
-def _started(words: list[str]) -> dict[str, Started]:
-    """Starts the processes of a run, so that they load while this one does; what takes none loads no more for it."""
-    if words[:1] != ["run"]:
-        return {}
-    from haploop.launch.processes.early import start_early
-
-    return start_early(words)
 
 
 def _refuse_what_is_no_text(words: list[str]) -> None:

@@ -61,7 +61,8 @@ def run(
     json: Json = False,
 ) -> None:
     """Run a scene to its end. Other terminals can steer and watch it meanwhile."""
-    with LeavingAtOnce():
+    early = (context.obj or {}).get("early", {})
+    with LeavingAtOnce(early):
         from haploop.launch.processes.foreign import ProgramError, check_wait, read_programs
         from haploop.launch.runs import start
         from haploop.launch.scene.toml_writer import inline
@@ -105,7 +106,7 @@ def run(
                 summary = start.run(
                     prepared,
                     in_process=in_process,
-                    early=(context.obj or {}).get("early"),
+                    early=early,
                     pace=math.inf if rate == "free" else rate,
                     clock=clock,
                     transport=transport,
