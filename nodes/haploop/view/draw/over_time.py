@@ -13,7 +13,7 @@ from haploop.view.store.history import TRUE, WALL_BOOK, History
 from haploop.view.store.lod_series import LodSeries
 
 # Rows per point of the page at most; beyond, the rows are summed up in so many buckets per point.
-_ROWS_A_POINT, _BUCKETS_A_POINT = 2.0, 0.75
+_ROWS_A_POINT, _BUCKETS_A_POINT = 2.0, 1.0
 # Parts of an overview of the run; units of own columns that are shown, the first.
 _OVERVIEW_PARTS, _MOST_UNITS = 256, 3
 _BODIES = {"x": "position", "tip_x": "position of the tip", "hand_x": "position of the hand"}

@@ -46,7 +46,7 @@ const FILLED = 0.5;
 const FAINT = 0.45;
 
 /**
- * A rough line as upright strips, one a pixel: [x, width, top, bottom] each, flat, in canvas pixels; null where the
+ * A rough line as upright strips, a pixel or two wide: [x, width, top, bottom] each, flat, in canvas pixels; null where the
  * line is smooth or its points lie apart. A pen that goes to and fro thousands of times takes twenty times as long.
  */
 export function strips(u, xs, ys) {
