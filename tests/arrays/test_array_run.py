@@ -254,7 +254,7 @@ def test_the_structures_of_many_scenes_are_those_of_each_whatever_they_share() -
     pools: dict[str, list[Any]] = {
         "device": [device, replace(device, damping=0.0), replace(device)],
         "wall": [wall, replace(wall, stiffness=7.0), replace(wall, occupies="above")],
-        "friction": [None, Friction(kinetic=0.01), Friction(kinetic=0.02)],
+        "friction": [None, Friction(kinetic=0.01), Friction(kinetic=0.02, breakaway=0.03)],
     }
     scenes = []
     for _ in range(200):

@@ -69,8 +69,8 @@ def groups(scenes: Sequence[Scene]) -> list[list[int]]:
     found: dict[Hashable, list[int]] = {}
     fits: dict[Hashable, bool] = {}
     for index, (scene, shape) in enumerate(zip(scenes, structures(scenes), strict=True)):
-        # Of one structure all can be or none, but for chains, whose numbers decide, too.
-        if shape not in fits or needs_chain(scene):
+        # Of one structure all can be or none, but for chains that differ, whose numbers decide, too.
+        if shape not in fits or (needs_chain(scene) and not scene.friction):
             fits[shape] = is_batchable(scene)
         if fits[shape]:
             found.setdefault(shape, []).append(index)

@@ -198,6 +198,7 @@ class Loops:
         self, of: StickSlip, halving: substeps.Halving, whole_steps: bool, tables: np.ndarray, held: np.ndarray
     ) -> None:
         rows = np.zeros((2, STATES + 2))
+        assert tables.shape[-1] <= STATES
         for row, (of_states, *others) in zip(rows, (of.force, of.change), strict=True):
             row[-2:] = others
             for i, factor in of_states:
