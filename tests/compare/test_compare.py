@@ -102,9 +102,10 @@ def test_every_stabilizer_has_the_same_effort_and_the_search_goes_where_most_is_
     rows = bench(Job(loop, family.name, 1000.0, ((TOLD, None), (AGAIN, None)), effort))
     *tuning, trial = asked
     if family.parts:
-        first, second = (count / 2 for count in tuning)
+        first, second, last = (count / 2 for count in tuning)
         assert first == effort.first * (effort.points + 1)
         assert effort.tuning * effort.around <= second <= effort.tuning * (effort.finalists + effort.around)
+        assert last == effort.last * (effort.finalists + 1)
     else:
         assert not tuning
     moved = 2 + 2 * bool(family.parts)

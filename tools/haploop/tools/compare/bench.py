@@ -23,7 +23,9 @@ _ROUGH, _CLOSE = 0.25, 0.08
 _RUNGS = ladder(1.7**-2, 1.7**2, 1.7)
 # The share of a box's logarithmic axes that is searched through the best.
 _ALONG = 0.6
-# Tuning has seeds of its own, from this one on.
+# The first parameters of all, about none, are this share of the smallest of the box.
+_NONE = 1.0 / 16.0
+# Every round of the tuning has seeds of its own, from this, twice and three times this on.
 _TUNING = 1000
 # What is 20 % off, together, to tell how sensitive the wall is to the device.
 _DEVICE = ("device.mass", "device.damping", "friction.kinetic", "transmission.stiffness")
@@ -32,8 +34,8 @@ OFF = (0.8, 1.2)
 Ends = tuple[float, float]
 # Of some block, these parameters.
 Choice = tuple[int, Values]
-# What choices hold, N/m, mean of so many seeds.
-Held = Callable[[Sequence[Choice], int], dict[Choice, float]]
+# What choices hold in a round of the tuning, N/m, mean of so many seeds.
+Held = Callable[[Sequence[Choice], int, int], dict[Choice, float]]
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,8 @@ class Effort:
 
     Attributes:
         points: parameters tried over the whole box by ``first`` seeds, the smallest of all beside them.
-        finalists: so many of them go on, with ``around`` more along the axes through the best, by ``tuning`` seeds.
+        finalists: so many of them go on, with ``around`` more along the axes through the best, by ``tuning`` seeds; the
+            best as many of these, and where they began, by ``last`` seeds, to see what few conditions break.
         seeds: try the best one.
         moved: of these also try it with all parameters, and the device, 20 % off.
     """
@@ -52,13 +55,14 @@ class Effort:
     finalists: int = 3
     around: int = 6
     tuning: int = 6
+    last: int = 24
     seeds: int = 32
     moved: int = 6
     of_seed: int = 3
 
 
 # Where the parameters of a like loop are known, the search begins and ends about them.
-BESIDE = Effort(points=0, finalists=1, tuning=3, seeds=16, moved=0)
+BESIDE = Effort(points=0, finalists=2, tuning=3, last=12, seeds=16, moved=0)
 
 
 @dataclass(frozen=True)
@@ -122,8 +126,8 @@ def bench(job: Job) -> tuple[Row, ...]:
 
     with Trial(Store(), 1) as trial:
 
-        def held(choices: Sequence[Choice], seeds: int) -> dict[Choice, float]:
-            asked = [query for choice in choices for query in queries(choice, _TUNING, seeds)]
+        def held(choices: Sequence[Choice], turn: int, seeds: int) -> dict[Choice, float]:
+            asked = [query for choice in choices for query in queries(choice, turn * _TUNING, seeds)]
             found = [each.rendered.held_N_m for each in tried(trial, asked, _ROUGH)]
             return dict(zip(choices, np.reshape(found, (-1, seeds)).mean(axis=1).tolist(), strict=True))
 
@@ -151,23 +155,25 @@ def _shares(as_is: Sequence[Trying], moved: Sequence[Trying], count: int) -> tup
 
 
 def _tuned(held: Held, ends: Sequence[Ends], job: Job) -> dict[int, Values]:
-    """Returns what renders most in each block: of some over the whole box; then of the best of them, and others along
-    the axes through the best, by more seeds.
-
-    The first has the smallest of all parameters, which are about none.
+    """Returns what renders most in each block: of some over the whole box; of the best of them, and others along the
+    axes through the best; of the best of these, and where the search began: the smallest of all parameters, which are
+    about none, or those of a like loop.
     """
     if not ends:
         return {block: () for block, _ in job.starts}
-    effort, smallest = job.effort, tuple(float(f"{low:.2g}") for low, _ in ends)
-    points = [smallest, *halton(ends, effort.points)]
-    searched = [(block, values) for block, start in job.starts for values in (points if start is None else [])]
-    known = held(searched, effort.first) if searched else {}
+    effort, smallest = job.effort, tuple(float(f"{low * _NONE:.2g}") for low, _ in ends)
+    begins = {block: smallest if start is None else start for block, start in job.starts}
+    points = [(block, values) for block, start in job.starts if start is None for values in halton(ends, effort.points)]
+    known = held([*begins.items(), *points], 1, effort.first) if points else dict.fromkeys(begins.items(), 0.0)
     going = list[Choice]()
-    for block, start in job.starts:
-        order = [start] if start is not None else _most(known, block)[: effort.finalists]
+    for block in begins:
+        order = _most(known, block)[: effort.finalists]
         going += [(block, values) for values in dict.fromkeys([*order, *along(order[0], ends, _ALONG, effort.around)])]
-    known = held(going, effort.tuning)
-    return {block: _most(known, block)[0] for block, _ in job.starts}
+    known = held(going, 2, effort.tuning)
+    last = [(block, values) for block in begins for values in
+            dict.fromkeys([*_most(known, block)[: effort.finalists], begins[block]])]  # fmt: skip
+    known = held(last, 3, effort.last)
+    return {block: _most(known, block)[0] for block in begins}
 
 
 def _most(known: dict[Choice, float], block: int) -> list[Values]:

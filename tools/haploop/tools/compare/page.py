@@ -43,10 +43,10 @@ DEVICES = {"premium15_cable": None, "touch": "1 ms", "omega3": "1 ms"}
 _INTRO = """\
 Every stabilizer that comes with haploop, each tuned by the same search with the same effort on the same task, then
 tried under seeds that the search has not seen. Written by `make comparison`; `haploop compare DEVICE` does the same
-for a device or a scene of yours. One is said to hold *more* than another where the 95 % interval of their difference,
-seed by seed under the same conditions, does not hold 0, the same way under two sets of seeds that share nothing, tuning
-included; all else cannot be told apart. A device file without a cable is taken as rigid, which without a delay would
-bear walls that no device renders: such a device has a round trip of 1 ms here."""
+for a device or a scene of yours. One is said to hold *more* than another where their difference, seed by seed under the
+same conditions, is more than three of its standard errors, the same way under two sets of seeds that share nothing,
+tuning included; all else cannot be told apart. A device file without a cable is taken as rigid, which without a delay
+would bear walls that no device renders: such a device has a round trip of 1 ms here."""
 _HELPS = "so adaptive inertia helps, but nowhere more than every other element"
 _BEST = "so adaptive inertia helps, and on {0} it is what to take"
 _MIXED = "so adaptive inertia helps on some loops and harms on others"
@@ -61,7 +61,7 @@ _HEADS = {
 }  # fmt: skip
 _BESIDE = """\
 On like loops: what is held without any element, and how much more with each, N/mm. Parameters are searched about
-those above alone, {around} by {tuning} seeds, and tried by {seeds}."""
+those above alone, {around} by {tuning} seeds and the best {finalists} by {last}, and tried by {seeds}."""
 _LIMITS = """\
 Seeds draw holds, sways, taps, device, hand and delay; they do not draw another friction, another hand or another task,
 and numbers that the device files assume are taken as they are. Parameters are tuned for what is held, not for the

@@ -1,15 +1,21 @@
-"""Rankings of stabilizers: two are apart whose difference, seed by seed, is surely not 0 under either set of seeds."""
+"""Rankings of stabilizers: two are apart whose difference, seed by seed, is far from 0 under either set of seeds."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import permutations
 from typing import NamedTuple
+
+import numpy as np
 
 from haploop.tools.advise.families import NOTHING
 from haploop.tools.compare.bench import Row
 from haploop.tools.compare.comparison import OfLoop
 from haploop.tools.search.intervals import Interval, mean_interval
+
+# Of some thousand pairs on a page a twentieth is beyond its 95 % interval by chance; so pairs are told by this many
+# standard errors.
+_ERRORS = 3.0
 
 
 def held(row: Row) -> Interval:
@@ -18,10 +24,14 @@ def held(row: Row) -> Interval:
 
 
 def more(row: Row, than: Row) -> Interval:
-    """Returns how much more is held than with another stabilizer, N/m: both bear the same conditions under a seed, so
-    that differences are taken seed by seed."""
+    """Returns how much more is held than with another stabilizer, N/m, with its 95 % interval."""
+    return mean_interval(_differences(row, than))
+
+
+def _differences(row: Row, than: Row) -> np.ndarray:
+    """Returns the differences seed by seed, N/m: under a seed both bear the same conditions."""
     both = zip(row.seeds, than.seeds, strict=True)
-    return mean_interval([one.rendered.held_N_m - other.rendered.held_N_m for one, other in both])
+    return np.array([one.rendered.held_N_m - other.rendered.held_N_m for one, other in both])
 
 
 def without(rows: Sequence[Row]) -> Row:
@@ -50,12 +60,13 @@ class Ranking(NamedTuple):
 
 
 def apart(rows: Sequence[Row]) -> frozenset[tuple[str, str]]:
-    """Returns the pairs, the larger first, whose mean difference has an interval without 0."""
+    """Returns the pairs, the larger first, whose mean difference is more than three of its standard errors."""
     pairs = set[tuple[str, str]]()
-    for some, other in combinations(rows, 2):
-        inside = more(some, other)
-        if inside.low > 0.0 or inside.high < 0.0:
-            pairs.add((some.family, other.family) if inside.low > 0.0 else (other.family, some.family))
+    for some, other in permutations(rows, 2):
+        differences = _differences(some, other)
+        error = float(np.std(differences, ddof=1)) / len(differences) ** 0.5
+        if float(np.mean(differences)) > _ERRORS * error:
+            pairs.add((some.family, other.family))
     return frozenset(pairs)
 
 

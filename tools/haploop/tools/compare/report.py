@@ -26,8 +26,8 @@ READING = (
     "in. Ripple: of the command above 30 Hz, peak to peak. Extra: the element's own force, largest and root mean "
     "square. ±20 %: what is held with all parameters, or the device, 20 % less and 20 % more, over that without. "
     "Breaks first: the softest wall that failed under any seed. * a parameter at the end of its search, † no wall was "
-    "too stiff: with others more may be held. ▲ ▼ told to hold more, or less, than none: the interval does not hold 0, "
-    "the same way under two sets of seeds, tuning included. Bold: not told from the best by the same rule."
+    "too stiff: with others more may be held. ▲ ▼ told to hold more, or less, than none: by three standard errors, the "
+    "same way under two sets of seeds, each with its own tuning. Bold: not told from the best by the same rule."
 )
 SIGNS = {"more": " ▲", "less": " ▼", "alike": ""}
 _TIED = "{0} renders most, {1}; it cannot be told apart from {2}."
@@ -56,8 +56,9 @@ def task_sentence(told: Comparison) -> str:
     effort = told.effort
     return (
         f"Tried by {told.task}; a seed draws {effort.of_seed} such conditions. Of each element {effort.points + 1} "
-        f"sets of parameters are tried by {effort.first} seeds, then the best {effort.finalists} and {effort.around} "
-        f"about them by {effort.tuning}, then the best by {effort.seeds} others. The walls are for comparing, not for "
+        f"sets of parameters are tried by {effort.first} seeds, the best {effort.finalists} and {effort.around} about "
+        f"them by {effort.tuning}, the best {effort.finalists} and the smallest by {effort.last}, and the best by "
+        f"{effort.seeds}, each time others. The walls are for comparing, not for "
         "building: `haploop advise` tries one in some thousand cases."
     )
 
