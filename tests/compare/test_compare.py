@@ -105,7 +105,7 @@ def test_every_stabilizer_has_the_same_effort_and_the_search_goes_where_most_is_
         first, second, last = (count / 2 for count in tuning)
         assert first == effort.first * (effort.points + 1)
         assert effort.tuning * effort.around <= second <= effort.tuning * (effort.finalists + effort.around)
-        assert last == effort.last * (effort.finalists + 1)
+        assert last == effort.last * 3
     else:
         assert not tuning
     moved = 2 + 2 * bool(family.parts)

@@ -27,6 +27,8 @@ _ALONG = 0.6
 _NONE = 1.0 / 16.0
 # Every round of the tuning has seeds of its own, from this, twice and three times this on.
 _TUNING = 1000
+# So many go into the last round, beside where the search began.
+_LASTING = 2
 # What is 20 % off, together, to tell how sensitive the wall is to the device.
 _DEVICE = ("device.mass", "device.damping", "friction.kinetic", "transmission.stiffness")
 OFF = (0.8, 1.2)
@@ -44,8 +46,8 @@ class Effort:
 
     Attributes:
         points: parameters tried over the whole box by ``first`` seeds, the smallest of all beside them.
-        finalists: so many of them go on, with ``around`` more along the axes through the best, by ``tuning`` seeds; the
-            best as many of these, and where they began, by ``last`` seeds, to see what few conditions break.
+        finalists: so many of them go on, with ``around`` more along the axes through the best, by ``tuning`` seeds.
+        last: seeds by which the best two of these, and where the search began, are tried, to see what few break.
         seeds: try the best one.
         moved: of these also try it with all parameters, and the device, 20 % off.
     """
@@ -55,14 +57,14 @@ class Effort:
     finalists: int = 3
     around: int = 6
     tuning: int = 6
-    last: int = 24
+    last: int = 32
     seeds: int = 32
     moved: int = 6
     of_seed: int = 3
 
 
 # Where the parameters of a like loop are known, the search begins and ends about them.
-BESIDE = Effort(points=0, finalists=2, tuning=3, last=12, seeds=16, moved=0)
+BESIDE = Effort(points=0, tuning=3, last=16, seeds=16, moved=0)
 
 
 @dataclass(frozen=True)
@@ -171,7 +173,7 @@ def _tuned(held: Held, ends: Sequence[Ends], job: Job) -> dict[int, Values]:
         going += [(block, values) for values in dict.fromkeys([*order, *along(order[0], ends, _ALONG, effort.around)])]
     known = held(going, 2, effort.tuning)
     last = [(block, values) for block in begins for values in
-            dict.fromkeys([*_most(known, block)[: effort.finalists], begins[block]])]  # fmt: skip
+            dict.fromkeys([*_most(known, block)[:_LASTING], begins[block]])]  # fmt: skip
     known = held(last, 3, effort.last)
     return {block: _most(known, block)[0] for block in begins}
 

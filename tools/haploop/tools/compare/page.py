@@ -61,7 +61,7 @@ _HEADS = {
 }  # fmt: skip
 _BESIDE = """\
 On like loops: what is held without any element, and how much more with each, N/mm. Parameters are searched about
-those above alone, {around} by {tuning} seeds and the best {finalists} by {last}, and tried by {seeds}."""
+those above alone, {around} by {tuning} seeds, the best two and those above by {last}, and tried by {seeds}."""
 _LIMITS = """\
 Seeds draw holds, sways, taps, device, hand and delay; they do not draw another friction, another hand or another task,
 and numbers that the device files assume are taken as they are. Parameters are tuned for what is held, not for the
