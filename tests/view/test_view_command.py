@@ -252,5 +252,5 @@ def test_a_stopped_viewer_costs_the_run_nothing_and_is_told_what_it_missed(launc
 
 @pytest.mark.slow
 def test_a_viewer_stopped_in_real_time_costs_the_run_nothing(launched, tmp_path):
-    """Blocks of a tick fill its queues in three seconds."""
-    stopped_for(launched, tmp_path, 3.0, "duration=6", "run.block_ticks=1", pace=1.0)
+    """Blocks of a tick fill its queues in two seconds."""
+    stopped_for(launched, tmp_path, 2.0, "duration=5", "run.block_ticks=1", pace=1.0)

@@ -19,6 +19,8 @@ Columns = Mapping[str, np.ndarray]
 _RECENT_TICKS, _RECENT_STEPS, _LEAST_TICKS = 16_384, 131_072, 512
 # Books of elements that are kept, the newest: every change of a parameter opens one.
 _MOST_BOOKS = 16
+# Own columns of elements that are kept at once, so that they crowd no force out.
+_MOST_OWN = 16
 _NO_UNITS: Mapping[str, str] = MappingProxyType({})
 TRUE, WALL_BOOK, EARLIER = ".true", "wall.true", "earlier.true"
 
@@ -128,11 +130,13 @@ class History:
             kept[f"element.{place}.{element.name}"] = force
             if "inertia" in element.name and "mass" in element.parameters:
                 kept[f"mass.{place}.{element.name}"] = np.where(force != 0.0, element.parameters["mass"], 0.0)
-            own = f"dissipation.{place}."
-            for column in (one for one in units if one.startswith(own) and np.isfinite(columns[one]).any()):
-                name = column.removeprefix(own)
-                kept[known := f"own.{place}.{element.name}.{name}"] = columns[column]
-                self.own[known] = units[column], f"element {place}: {element.name}, {name}"
+        for column in [name for name in units if np.isfinite(columns[name]).any()][:_MOST_OWN]:
+            _, place, name = column.split(".", 2)
+            if int(place) >= len(at_work.elements):
+                continue
+            kind = at_work.elements[int(place)].name
+            kept[known := f"own.{place}.{kind}.{name}"] = columns[column]
+            self.own[known] = units[column], f"element {place}: {kind}, {name}"
         self._append(self.ticks, tick, kept)
 
     def append_energy(self, tick: int, columns: Columns) -> None:
