@@ -166,7 +166,7 @@ class ClockClient:
 
     def keep_in_touch(self, tick: int, on: str) -> None:
         """Reports WAITING, and takes what the clock has sent, where a node at work has been quiet."""
-        if self.is_quiet:
+        if self._now() >= self._due:  # asked with every message of the loop
             self.waiting(tick, on)
             self.poll()
 

@@ -15,11 +15,13 @@ import zmq
 
 
 class Machine:
-    """The machine of this process."""
+    """The machine of this process.
 
-    def now(self) -> float:
-        """Returns the wall clock, s, which never goes back."""
-        return time.monotonic()
+    Attributes:
+        now: returns the wall clock, s, which never goes back.
+    """
+
+    now = staticmethod(time.monotonic)
 
     def poller(self) -> zmq.Poller:
         return zmq.Poller()
