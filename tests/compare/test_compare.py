@@ -18,7 +18,7 @@ from haploop.tools.advise.walls.limit import Query
 from haploop.tools.advise.walls.rendered import Rendered, Trying, rendered, tried
 from haploop.tools.advise.walls.trial import Store, Trial
 from haploop.tools.compare import bench as of_bench
-from haploop.tools.compare.bench import BESIDE, Effort, Job, Row, along, bench
+from haploop.tools.compare.bench import BESIDE, Effort, Job, Row, Shown, along, bench, gentlest
 from haploop.tools.compare.comparison import AGAIN, TOLD, Comparison, Kept, OfLoop, bounded_N_m, plays
 from haploop.tools.compare.conditions import draw
 from haploop.tools.compare.page import page, places, sentences
@@ -105,7 +105,7 @@ def test_every_stabilizer_has_the_same_effort_and_the_search_goes_where_most_is_
         first, second, last = (count / 2 for count in tuning)
         assert first == effort.first * (effort.points + 1)
         assert effort.tuning * effort.around <= second <= effort.tuning * (effort.finalists + effort.around)
-        assert last == effort.last * 3
+        assert last == effort.last * (effort.finalists + 1)
     else:
         assert not tuning
     moved = 2 + 2 * bool(family.parts)
@@ -116,6 +116,13 @@ def test_every_stabilizer_has_the_same_effort_and_the_search_goes_where_most_is_
     assert len(rows[0].parameter) == 2 * bool(family.parts)
     beside = bench(Job(loop, family.name, 1000.0, tuple((row.block, row.values) for row in rows), BESIDE))
     assert all(held(more).value >= held(less).value for more, less in zip(beside, rows, strict=True))
+
+
+def test_of_what_holds_as_much_within_a_standard_error_the_least_force_is_taken():
+    held_N_m = {(9.0,): [900.0, 1100.0, 1000.0], (5.0,): [950.0, 990.0, 1040.0], (1.0,): [700.0, 800.0, 750.0]}
+    known = {values: Shown(np.array(of), np.full(3, values[0])) for values, of in held_N_m.items()}
+    assert gentlest(known) == (5.0,)
+    assert gentlest({values: each for values, each in known.items() if values != (5.0,)}) == (9.0,)
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,8 +28,6 @@ _ALONG = 0.6
 _NONE = 1.0 / 16.0
 # Every round of the tuning has seeds of its own, from this, twice and three times this on.
 _TUNING = 1000
-# So many go into the last round, beside where the search began.
-_LASTING = 2
 # What is 20 % off, together, to tell how sensitive the wall is to the device.
 _DEVICE = ("device.mass", "device.damping", "friction.kinetic", "transmission.stiffness")
 OFF = (0.8, 1.2)
@@ -36,8 +35,17 @@ OFF = (0.8, 1.2)
 Ends = tuple[float, float]
 # Of some block, these parameters.
 Choice = tuple[int, Values]
-# What choices hold in a round of the tuning, N/m, mean of so many seeds.
-Held = Callable[[Sequence[Choice], int, int], dict[Choice, float]]
+
+
+class Shown(NamedTuple):
+    """What comes of parameters under each seed: held stiffness, N/m, and the element's own force, r.m.s., N."""
+
+    held_N_m: np.ndarray
+    force_N: np.ndarray
+
+
+# What choices show in a round of the tuning, under so many seeds.
+Shows = Callable[[Sequence[Choice], int, int], dict[Choice, Shown]]
 
 
 @dataclass(frozen=True)
@@ -47,7 +55,7 @@ class Effort:
     Attributes:
         points: parameters tried over the whole box by ``first`` seeds, the smallest of all beside them.
         finalists: so many of them go on, with ``around`` more along the axes through the best, by ``tuning`` seeds.
-        last: seeds by which the best two of these, and where the search began, are tried, to see what few break.
+        last: seeds by which the best as many of these, and where the search began, are tried, to see what few break.
         seeds: try the best one.
         moved: of these also try it with all parameters, and the device, 20 % off.
     """
@@ -57,14 +65,14 @@ class Effort:
     finalists: int = 3
     around: int = 6
     tuning: int = 6
-    last: int = 32
+    last: int = 24
     seeds: int = 32
     moved: int = 6
     of_seed: int = 3
 
 
 # Where the parameters of a like loop are known, the search begins and ends about them.
-BESIDE = Effort(points=0, tuning=3, last=16, seeds=16, moved=0)
+BESIDE = Effort(points=0, tuning=3, last=12, seeds=16, moved=0)
 
 
 @dataclass(frozen=True)
@@ -89,7 +97,7 @@ class Row:
     """What was found of a stabilizer on a loop.
 
     Attributes:
-        values: the parameters that render most in the tuning, in the order of the family.
+        values: the parameters of the tuning, in the order of the family.
         at_edge: the parameters within a twentieth of the end of their search, and "wall" where no stiffest was found.
         seeds: what came of each seed with those parameters.
         parameter, device: the held stiffness with all parameters, or the device, 20 % less and more, over that without.
@@ -128,12 +136,13 @@ def bench(job: Job) -> tuple[Row, ...]:
 
     with Trial(Store(), 1) as trial:
 
-        def held(choices: Sequence[Choice], turn: int, seeds: int) -> dict[Choice, float]:
+        def shown(choices: Sequence[Choice], turn: int, seeds: int) -> dict[Choice, Shown]:
             asked = [query for choice in choices for query in queries(choice, turn * _TUNING, seeds)]
-            found = [each.rendered.held_N_m for each in tried(trial, asked, _ROUGH)]
-            return dict(zip(choices, np.reshape(found, (-1, seeds)).mean(axis=1).tolist(), strict=True))
+            found = [(each.rendered.held_N_m, each.rendered.extra_rms_N) for each in tried(trial, asked, _ROUGH)]
+            return {choice: Shown(*each.T) for choice, each in
+                    zip(choices, np.reshape(found, (-1, seeds, 2)), strict=True)}  # fmt: skip
 
-        best = _tuned(held, ends, job)
+        best = _tuned(shown, ends, job)
         asked = [query for choice in best.items() for query in queries(choice, 1, effort.seeds)]
         (block, values), *_ = best.items()
         off = [(_times(values, ends, factor), 1.0) for factor in OFF] if values else []
@@ -156,31 +165,41 @@ def _shares(as_is: Sequence[Trying], moved: Sequence[Trying], count: int) -> tup
     return tuple(each / base if base else 0.0 for each in sums)
 
 
-def _tuned(held: Held, ends: Sequence[Ends], job: Job) -> dict[int, Values]:
+def _tuned(shows: Shows, ends: Sequence[Ends], job: Job) -> dict[int, Values]:
     """Returns what renders most in each block: of some over the whole box; of the best of them, and others along the
     axes through the best; of the best of these, and where the search began: the smallest of all parameters, which are
-    about none, or those of a like loop.
+    about none, or those of a like loop. Of what then holds as much it is what adds the least force.
     """
     if not ends:
         return {block: () for block, _ in job.starts}
     effort, smallest = job.effort, tuple(float(f"{low * _NONE:.2g}") for low, _ in ends)
     begins = {block: smallest if start is None else start for block, start in job.starts}
     points = [(block, values) for block, start in job.starts if start is None for values in halton(ends, effort.points)]
-    known = held([*begins.items(), *points], 1, effort.first) if points else dict.fromkeys(begins.items(), 0.0)
+    known = shows([*begins.items(), *points], 1, effort.first) if points else {}
     going = list[Choice]()
-    for block in begins:
-        order = _most(known, block)[: effort.finalists]
+    for block, begin in begins.items():
+        order = _most(known, block)[: effort.finalists] or [begin]
         going += [(block, values) for values in dict.fromkeys([*order, *along(order[0], ends, _ALONG, effort.around)])]
-    known = held(going, 2, effort.tuning)
+    known = shows(going, 2, effort.tuning)
     last = [(block, values) for block in begins for values in
-            dict.fromkeys([*_most(known, block)[:_LASTING], begins[block]])]  # fmt: skip
-    known = held(last, 3, effort.last)
-    return {block: _most(known, block)[0] for block in begins}
+            dict.fromkeys([*_most(known, block)[: effort.finalists], begins[block]])]  # fmt: skip
+    known = shows(last, 3, effort.last)
+    return {block: gentlest({values: each for (of, values), each in known.items() if of == block}) for block in begins}
 
 
-def _most(known: dict[Choice, float], block: int) -> list[Values]:
+def _most(known: Mapping[Choice, Shown], block: int) -> list[Values]:
     """Returns the parameters of a block, those that render most first."""
-    return sorted((values for of, values in known if of == block), key=lambda values: -known[block, values])
+    return sorted((values for of, values in known if of == block),
+                  key=lambda values: -float(known[block, values].held_N_m.mean()))  # fmt: skip
+
+
+def gentlest(known: Mapping[Values, Shown]) -> Values:
+    """Returns the parameters that add the least force, of those that hold as much as the best within a standard error
+    of the difference (the rule of Breiman et al. 1984): what holds most by chance is often near where it breaks."""
+    best = max(known.values(), key=lambda each: float(each.held_N_m.mean()))
+    off = {values: best.held_N_m - each.held_N_m for values, each in known.items()}
+    alike = [values for values, each in off.items() if each.mean() <= np.std(each, ddof=1) / len(each) ** 0.5]
+    return min(alike, key=lambda values: float(known[values].force_N.mean()))
 
 
 def along(best: Values, ends: Sequence[Ends], share: float, count: int) -> list[Values]:

@@ -114,7 +114,8 @@ def _costs(ax: Axes, of: OfLoop) -> None:
         ax.plot([], [], marker, color=style.ELEMENTS[number], label=label, markersize=5)
     _finish(ax, "", "force, N", of, zero=False)
     ax.set_xscale("log")
-    style.plain_numbers(ax.xaxis)
+    low, high = ax.get_xlim()
+    style.plain_numbers(ax.xaxis, (1.0,) if high > 100.0 * low else (1.0, 2.0, 5.0))
     _legend(ax)
 
 

@@ -61,7 +61,7 @@ _HEADS = {
 }  # fmt: skip
 _BESIDE = """\
 On like loops: what is held without any element, and how much more with each, N/mm. Parameters are searched about
-those above alone, {around} by {tuning} seeds, the best two and those above by {last}, and tried by {seeds}."""
+those above alone, {around} by {tuning} seeds, the best {finalists} and those above by {last}, and tried by {seeds}."""
 _LIMITS = """\
 Seeds draw holds, sways, taps, device, hand and delay; they do not draw another friction, another hand or another task,
 and numbers that the device files assume are taken as they are. Parameters are tuned for what is held, not for the
@@ -144,10 +144,11 @@ def _verdict(loops: Loops) -> str:
 
 
 def _most(device: str, of: OfLoop) -> str:
-    found, alone = best(of)[0], format_stiffness(held(without(of.rows)).value)
+    (found, tied), alone = best(of), format_stiffness(held(without(of.rows)).value)
     if choice(of).family == NOTHING.name:
         return f"on {device} by no element more than without, {alone}"
-    return f"on {device} by {found.family}, {format_stiffness(held(found).value)} against {alone} without"
+    alike = f"not told from {len(tied)} others" if tied else "and more than by every other"
+    return f"on {device} by {found.family}, {format_stiffness(held(found).value)} against {alone} without, {alike}"
 
 
 def _sentence(words: str) -> str:

@@ -57,9 +57,9 @@ def task_sentence(told: Comparison) -> str:
     return (
         f"Tried by {told.task}; a seed draws {effort.of_seed} such conditions. Of each element {effort.points + 1} "
         f"sets of parameters are tried by {effort.first} seeds, the best {effort.finalists} and {effort.around} about "
-        f"them by {effort.tuning}, the best two and the smallest by {effort.last}, and the best by {effort.seeds}, "
-        "each time others. The walls are for comparing, not for "
-        "building: `haploop advise` tries one in some thousand cases."
+        f"them by {effort.tuning}, the best {effort.finalists} and the smallest by {effort.last}; of what then holds "
+        f"as much within a standard error the one that adds the least force is tried by {effort.seeds}, each "
+        "time others. The walls are for comparing, not for building: `haploop advise` tries one in some thousand cases."
     )
 
 

@@ -58,11 +58,11 @@ def few_ticks(ax: Axes) -> None:
     ax.locator_params(axis="x", nbins=5)
 
 
-def plain_numbers(axis: Axis) -> None:
-    """Puts numbers at 1, 2, 5 and without powers of ten on a logarithmic axis."""
+def plain_numbers(axis: Axis, at: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
+    """Puts numbers at these in every decade and without powers of ten on a logarithmic axis."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_locator(LogLocator(subs=at))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
     axis.set_tick_params(which="minor", length=0)
