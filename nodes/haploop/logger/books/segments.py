@@ -24,8 +24,8 @@ Made = dict[tuple[int, bool], tuple[np.ndarray, np.ndarray]]
 _FINEST = 62
 # So many segments of a kind are integrated by themselves; fewer together with others, each by coefficients of its own.
 _MANY = 256
-# For so many segments in all.
-LOOPS = WhereItPays("haploop.logger.books.loops", 1_000_000)
+# For so many plant steps in all.
+LOOPS = WhereItPays("haploop.logger.books.loops", 200_000)
 
 
 @dataclass(frozen=True)

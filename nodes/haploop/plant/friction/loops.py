@@ -5,6 +5,8 @@ The formulas are those of ``stick_slip`` and ``substeps`` as they stand; so are 
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from haploop.plant.chain import motion
@@ -206,7 +208,6 @@ class Loops:
         of_each_state = np.ascontiguousarray(tables.swapaxes(2, 3)), np.ascontiguousarray(held.transpose(0, 2, 3, 1))
         self._system = of.mass_kg, of.speed_up, rows, np.array([of.v, *halving, whole_steps]), *of_each_state
         self._pieces = np.empty((_PIECES + 1, 6 + tables.shape[-1] + of.v))
-        self._ends = dict[tuple[int, ...], np.ndarray]()
 
     def advance(
         self, course: np.ndarray, forced: tuple[np.ndarray, np.ndarray], loads: np.ndarray, holds: list[Hold],
@@ -226,16 +227,12 @@ class Loops:
             (member, rows of its pieces) of those that have any; None where one switches too often for the loops: the
             interval is then to be moved by other means.
         """
-        counts = tuple([hold[0] for hold in holds])
-        if counts not in self._ends:
-            self._ends[counts] = np.cumsum(counts)
+        ends = _ends_of(tuple([hold[0] for hold in holds]))
         found, pieces, begun, members = list[tuple[int, np.ndarray]](), self._pieces, 0, course.shape[2]
         upto = np.empty(members, np.int64)
         while begun < members:
             pieces[-1, 0] = 0.0
-            member = _advance(
-                *self._system, laws, *forced, loads, self._ends[counts], first_step, course, modes, pieces, upto, begun
-            )
+            member = _advance(*self._system, laws, *forced, loads, ends, first_step, course, modes, pieces, upto, begun)
             if member == begun:
                 return None
             if count := int(pieces[-1, 0]):
@@ -246,6 +243,12 @@ class Loops:
                         first = end
             begun = member
         return found
+
+
+@lru_cache(maxsize=1024)
+def _ends_of(counts: tuple[int, ...]) -> np.ndarray:
+    """Returns the step at which each hold of so many steps ends."""
+    return np.cumsum(counts)
 
 
 def try_out() -> None:
