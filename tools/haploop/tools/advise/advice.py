@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
@@ -45,7 +45,8 @@ SAFE_MEANS = (
 )
 
 
-class Changed(NamedTuple):
+@dataclass(frozen=True)
+class Changed:
     """The limit of a changed loop as described, with the element advised, and as a multiple of that without change."""
 
     words: str
@@ -106,9 +107,9 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
 
     def rows(some: dict[str, Scene]) -> tuple[Changed, ...]:
         base = described.stiffness_N_m
-        made = [(words, limit) for words, limit in zip(some, limits, strict=False)]
-        return tuple(sorted((Changed(*row, row[1].stiffness_N_m / base if base else 0.0) for row in made),
-                            key=lambda row: -row.factor))  # fmt: skip
+        made = zip(some, limits, strict=False)
+        found = (Changed(words, limit, limit.stiffness_N_m / base if base else 0.0) for words, limit in made)
+        return tuple(sorted(found, key=lambda row: -row.factor))
 
     changed, without = rows(altered), rows(ideal)
     by_number = dict(zip(otherwise, limits, strict=True))
@@ -166,16 +167,5 @@ def advice_data(told: Advice, sentences: list[str]) -> AdviceData:
         "safe_means": SAFE_MEANS,
         "reading": READING,
         "advice": " ".join(sentences),
-        **_as_data(replace(told, scene=None)),
+        **asdict(replace(told, scene=None)),
     }
-
-
-def _as_data(value: Any) -> Any:
-    """Returns a value as JSON has it: objects for dataclasses and named tuples."""
-    if is_dataclass(value):
-        return {field.name: _as_data(getattr(value, field.name)) for field in fields(value)}
-    if named := getattr(value, "_asdict", None):
-        return _as_data(named())
-    if isinstance(value, tuple):
-        return [_as_data(each) for each in value]
-    return {key: _as_data(each) for key, each in value.items()} if isinstance(value, dict) else value

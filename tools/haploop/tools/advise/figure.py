@@ -29,7 +29,8 @@ def figure_of(told: Advice) -> Figure:
 
     Raises FigureError where matplotlib is missing.
     """
-    others = [(words, limit.stiffness_N_m, format_limit(limit)) for words, limit, _ in (*told.changed, *told.without)]
+    changed = (*told.changed, *told.without)
+    others = [(row.words, row.limit.stiffness_N_m, format_limit(row.limit)) for row in changed]
     for of, half, double in (row for row in told.assumed if moves(row[1], row[2], told.described)):
         others += [(f"{of.key} halved (assumed)", half.stiffness_N_m, format_limit(half))]
         others += [(f"{of.key} doubled (assumed)", double.stiffness_N_m, format_limit(double))]

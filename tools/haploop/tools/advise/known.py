@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.scene import Scene
@@ -15,7 +14,8 @@ from haploop.tools.render.units import amount
 ABBOTT = "Abbott & Okamura 2005"
 
 
-class Formula(NamedTuple):
+@dataclass(frozen=True)
+class Formula:
     """A formula with its numbers.
 
     Attributes:
@@ -59,7 +59,8 @@ def formulas(loop: Scene) -> list[Formula]:
     return found
 
 
-class Published(NamedTuple):
+@dataclass(frozen=True)
+class Published:
     """A stiffness in N/m that somebody states or shows, by whom, and what it is.
 
     Attributes:

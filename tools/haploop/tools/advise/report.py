@@ -56,7 +56,7 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     broken = found.breaks
     breaks = f"{format_stiffness(broken[0])}: {describe(broken[1])}" if broken else _NOTHING_BREAKS
     lines.append(("breaks first", breaks))
-    gains = [f"{words}: {fixed(factor, 2)} times" for words, _, factor in told.changed if factor >= _TELLS]
+    gains = [f"{row.words}: {fixed(row.factor, 2)} times" for row in told.changed if row.factor >= _TELLS]
     lines.append(("gains most", "; ".join(gains[:3]) or _NO_CHANGE))
     if told.published:
         values = [f"{format_stiffness(value.stiffness_N_m)} ({value.by})" for value in told.published]
@@ -133,8 +133,9 @@ def _limits(told: Advice) -> Table:
 def _changes(told: Advice) -> Table:
     limit = f"limit, to {CLOSE * 100:.0f} %"
     table = make_table("one change, or an ideal", limit, "times", numbers=(limit, "times"))
-    for words, limit, factor in (*told.changed, *told.without):
-        table.add_row(words, format_limit(limit), fixed(factor, 2), style="bold" if factor >= _TELLS else "")
+    for row in (*told.changed, *told.without):
+        style = "bold" if row.factor >= _TELLS else ""
+        table.add_row(row.words, format_limit(row.limit), fixed(row.factor, 2), style=style)
     return table
 
 

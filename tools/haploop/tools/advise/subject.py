@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from haploop.controller.dissipation import Element
 from haploop.launch.scene.bundled import bundled, found
@@ -57,7 +57,8 @@ class InvalidRequest(ValueError):
     """A device, hand or estimator that does not exist, or gets no advice; the message says what is allowed."""
 
 
-class Assumed(NamedTuple):
+@dataclass(frozen=True)
+class Assumed:
     """A number that nobody published: its dotted key, and the file's words on it."""
 
     key: str
