@@ -88,11 +88,12 @@ export function drawStrips(u, found, { width, dash = [] }) {
   u.ctx.rect(left, top, wide, tall);
   u.ctx.clip();
   for (const part of isFaint ? ["within", "edges"] : ["whole"]) {
-    u.ctx.globalAlpha = part === "within" ? FAINT : 1;
     for (let i = 0; i < found.length; i += 4) {
       const [x, across, from, to] = [found[i], found[i + 1], found[i + 2] - pen / 2, found[i + 3] + pen / 2];
-      if (part !== "within" && isGap(x)) continue;
       const isThick = to - from > THICK * pen;
+      const isBetween = part !== "within" && isGap(x);
+      if (isBetween && !isThick) continue; // a peak is not left out between two dashes
+      u.ctx.globalAlpha = isBetween || part === "within" ? FAINT : 1;
       if (part === "edges" && isThick) {
         u.ctx.fillRect(x, from, across, pen);
         u.ctx.fillRect(x, to - pen, across, pen);
