@@ -36,7 +36,7 @@ _RECORDED = {
         Kill(When(-1, 0.25), "logger"),
     ),
     "a second logger that is stopped as the run ends, for less than its deadline": (
-        SecondLogger(When(1, 0.0), ("held", 0.016)),
+        SecondLogger(When(1, 0.0), ("held", 0.012)),
     ),
     "a second logger that joins as the run ends": (SecondLogger(When(69, 0.0), _STAYS),),
 }

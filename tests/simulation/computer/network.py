@@ -22,6 +22,8 @@ ROOM: dict[int, tuple[int, int]] = {zmq.XPUB: (129, 256), zmq.SUB: (129, 256)}
 _ROOM = (501, 1000)
 _identities = itertools.count(1)
 _RETRY_S = 0.02
+# Far less than a kernel keeps, as these blocks are far smaller than those of a real run: all reports, and a block.
+_KERNEL_BYTES = 4096
 
 
 class Lane:
@@ -58,9 +60,20 @@ class Lane:
             self._launch()
 
     @property
-    def due(self) -> float:
+    def arrives_at(self) -> float:
         """When the last of it arrives: a process that is stopped takes nothing."""
         return max(self.last, self.to.process.stopped_until) if self.flying and self.to is not None else self.last
+
+    @property
+    def due(self) -> float:
+        """When the last of it is off its sender's hands."""
+        return self.last if self._in_the_kernel == len(self.flying) else self.arrives_at
+
+    @property
+    def _in_the_kernel(self) -> int:
+        """How many of the messages under way the kernel keeps for a process that is stopped."""
+        sizes = itertools.accumulate(sum(map(len, frames)) for frames in self.flying)
+        return sum(size <= _KERNEL_BYTES for size in sizes)
 
     def _arrive(self) -> None:
         if self.to is not None and self._world.now < self.to.process.stopped_until:
@@ -72,8 +85,9 @@ class Lane:
     def cut(self, linger_s: float) -> None:
         """Ends it: without linger, some of what is on its way, the latest, is lost."""
         world = self._world
-        if self.to is None or linger_s <= 0.0 or self.due > world.now + linger_s:
-            for _ in range(world.dice.randint(0, len(self.flying))):
+        is_lost = self.to is None or linger_s <= 0.0 or self.last > world.now + linger_s
+        if is_lost or self.due > world.now + linger_s:
+            for _ in range(world.dice.randint(0, len(self.flying) - (0 if is_lost else self._in_the_kernel))):
                 self.flying.pop()
 
 
@@ -119,7 +133,7 @@ class Pipe:
             if linger_s > 0.0:
                 self._world.after(linger_s, self._hang_up, end)
         else:
-            self._world.at(away.due, self._hang_up, end)
+            self._world.at(away.arrives_at, self._hang_up, end)
 
     def _hang_up(self, end: Any) -> None:
         other = self.far if end is self.near else self.near
