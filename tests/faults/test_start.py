@@ -91,11 +91,15 @@ def test_the_processes_of_a_run_load_beside_their_launcher_but_for_those_it_may_
     for words in (["run", "fig6c", "--in-process"], ["run", "--node=plant=own", "fig6c"]):
         start_early(words, early)
         assert early == {}
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (256, hard))
     start_early(["run", "fig6c"], early)
     assert early.keys() == PROCESSES.keys()
     for process in early.values():
+        assert resource.prlimit(process.process.pid, resource.RLIMIT_NOFILE)[0] > min(256, hard - 1)
         process.end()
         assert process.process.returncode == -signal.SIGKILL
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
 def test_a_process_that_is_told_of_no_run_ends_with_its_launcher() -> None:

@@ -12,6 +12,7 @@ from collections.abc import Mapping, MutableMapping, Sequence
 from typing import NamedTuple
 
 from haploop.launch.processes.one_thread import ask_for_one_thread
+from haploop.launch.processes.open_files import ask_for_many
 from haploop.protocol.transport.messages import PROCESSES
 
 # What begins with one of these asks for no such processes, or for others beside them.
@@ -80,6 +81,7 @@ def start_early(words: Sequence[str], early: MutableMapping[str, Started]) -> No
     """Starts the processes of the run that a command line asks for, by role; none where it may need others."""
     if any(word.startswith(_OTHERS) for word in words):
         return
+    ask_for_many()
     for role in PROCESSES:
         try:
             early[role] = start_node(role)

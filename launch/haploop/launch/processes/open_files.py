@@ -1,15 +1,13 @@
-"""The number of files that a process may open: ZeroMQ aborts one to which nobody more can connect."""
+"""The number of files that a process may open: ZeroMQ aborts one to which nobody more can connect. It is light."""
 
 from __future__ import annotations
-
-from haploop.launch.spec import OutputError
 
 # What a process of a run opens, with some to spare; and how many are asked for, since everybody who connects takes one.
 _LEAST, _MANY = 64, 65_536
 
 
-def allow_many() -> None:
-    """Lets this process, and those it starts, open many files; raises OutputError where they may open too few."""
+def ask_for_many() -> float:
+    """Lets this process, and those it starts from now on, open many files; returns how many they may."""
     import resource
 
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -21,8 +19,16 @@ def allow_many() -> None:
             soft = most
         except (OSError, ValueError):  # what the system allows less of than it says
             pass
-    if soft != infinite and soft < _LEAST:
+    return float("inf") if soft == infinite else soft
+
+
+def allow_many() -> None:
+    """Does as :func:`ask_for_many`; raises OutputError where they may open too few."""
+    from haploop.launch.spec import OutputError
+
+    may = ask_for_many()
+    if may < _LEAST:
         raise OutputError(
-            f"A process of a run opens up to {_LEAST} files, but here it may open {soft}; "
+            f"A process of a run opens up to {_LEAST} files, but here it may open {may}; "
             f"allow more with ulimit -n {_LEAST}."
         )
