@@ -141,7 +141,6 @@ LOOPS = [(0.2, 0.0), (1.0, 0.002), (2.0, 0.0005)]
     [
         (0.5, LOOPS[1:2]),
         pytest.param(0.5, LOOPS, marks=pytest.mark.slow),
-        pytest.param(3.0, LOOPS, marks=pytest.mark.slow),
         pytest.param(6.0, LOOPS, marks=pytest.mark.slow),
     ],
 )
