@@ -18,11 +18,13 @@ from rich.table import Table
 from yardsticks import SCENE, loop_us, ping_pong_us, plain_loop_us
 
 from haploop.controller.dissipation import registry
+from haploop.launch.batch.run import run_batch
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.logger.books import segments
 from haploop.logger.summary import versions
 from haploop.plant.friction import motion
+from haploop.protocol.scene.paths import with_value
 from haploop.tools.machine import machine
 
 
@@ -35,8 +37,11 @@ def _in_process_us(seconds: float) -> float:
     return (time.perf_counter() - began) / summary["ticks"] * 1e6
 
 
-def _realistic_us(seconds: float, *, by_loops: bool) -> Callable[[], float]:
-    """As ``_in_process_us`` with cable, grip and friction, the hand tapping: by loops of machine code, or without."""
+def _realistic_us(seconds: float, *, by_loops: bool, members: int = 1) -> Callable[[], float]:
+    """As ``_in_process_us`` with cable, grip and friction, the hand tapping: by loops of machine code, or without.
+
+    Of so many members, each with a wall of its own, in one batch.
+    """
 
     def measure() -> float:
         for loops in (motion.LOOPS, segments.LOOPS):
@@ -45,9 +50,11 @@ def _realistic_us(seconds: float, *, by_loops: bool) -> Callable[[], float]:
         settings = [f"duration={seconds}", "run.log=none", "run.verdict=window"]
         whole, kinds = load(SCENE.parent / "all_effects.toml", settings), registry()
         scene = replace(whole, jitter=None, loss=None, noise=None, actuator=None)
+        walls_N_m = [100.0 + 1400.0 * place / members for place in range(members)]
+        scenes = [with_value(scene, "wall.stiffness", stiffness) for stiffness in walls_N_m]
         began = time.perf_counter()
-        summary = run_in_process(scene, kinds)
-        return (time.perf_counter() - began) / summary["ticks"] * 1e6
+        summaries = run_batch(scenes, kinds) if members > 1 else [run_in_process(scene, kinds)]
+        return (time.perf_counter() - began) / sum(summary["ticks"] for summary in summaries) * 1e6
 
     return measure
 
@@ -82,6 +89,7 @@ ROWS: dict[str, tuple[Callable[[], float], str, str, float]] = {
     "one process, books, no log": (lambda: _in_process_us(20.0), "us/tick", "plain loop", 8.0 / 2.7),
     "the same with cable, grip, friction": (_realistic_us(10.0, by_loops=False), "us/tick", "plain loop", 0.0),
     "the same by numba's loops": (_realistic_us(10.0, by_loops=True), "us/tick", "plain loop", 0.0),
+    "128 of them in one batch": (_realistic_us(1.0, by_loops=True, members=128), "us/tick", "plain loop", 0.0),
     "haploop run of one tick, start to end": (_first_tick_s, "s", "", 0.0),
 }
 
