@@ -212,9 +212,8 @@ class SimRun:
     def _node(self, role: str, sockets: Path, start: dict[str, Any]) -> Callable[[], int]:
         work = import_module(PROCESSES[role].module).work
         disk = self.disk if role == "logger" else None
-        return lambda: take_part(
-            self.context(self.nodes[role], disk), role, work, start, sockets, life=_Life(self, role)
-        )
+        life: Any = _Life(self, role)
+        return lambda: take_part(self.context(self.nodes[role], disk), role, work, start, sockets, life=life)
 
     @contextlib.contextmanager
     def interrupts(self, usual_from: int) -> Iterator[list[int]]:
