@@ -126,7 +126,7 @@ def main() -> None:
         ratio = f"{median / kernel:.2f}" if kernel else ""
         table.add_row(name, f"{median:.3g}", spread, f"{alone / median:.1f}", ratio)
     Console(width=120).print(table)
-    keep("arrays", seen, yardsticks, options.compare)
+    keep(f"arrays, {len(scenes)} scenes of {scenes[0].duration:g} s", seen, yardsticks, options.compare)
 
 
 if __name__ == "__main__":

@@ -108,7 +108,7 @@ def main() -> None:
             seen[name].append(measure())
     medians = {name: statistics.median(values) for name, values in seen.items()}
     _show(rows, seen, medians, options.repeats)
-    keep("bench", seen, {name: row[2] for name, row in rows.items()}, options.compare)
+    keep("bench", seen, {name: row[2] for name, row in ROWS.items()}, options.compare)
 
 
 def _show(rows: dict, seen: dict[str, list[float]], medians: dict[str, float], repeats: int) -> None:

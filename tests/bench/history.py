@@ -12,7 +12,7 @@ import statistics
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rich.console import Console
 from rich.table import Table
@@ -64,27 +64,25 @@ def _spread(repeats: list[float]) -> float:
 
 
 def keep(script: str, seen: Seen, yardsticks: Mapping[str, str], compare: Path | None) -> None:
-    """Adds a run to the history; first compares it with the last like it in the file ``compare``, if one is named."""
+    """Adds a run to the history, and compares it with the last like it in the file ``compare``, if one is named."""
     record = {"script": script, "machine": machine(), "python": platform.python_version()}
-    if compare:
-        _show(compare, record, seen, yardsticks)
+    earlier = compare.read_text(encoding="utf-8").splitlines() if compare and compare.exists() else []
     at = datetime.now(UTC).isoformat(timespec="seconds")
     HISTORY.parent.mkdir(exist_ok=True)
     with HISTORY.open("a", encoding="utf-8") as file:
         file.write(json.dumps({**record, "at": at, "commit": commit(), "seen": seen}) + "\n")
+    alike = [run for run in map(json.loads, earlier) if record.items() <= run.items()]
+    if alike:
+        _show(alike[-1], seen, yardsticks)
+    elif compare:
+        print(f"Nothing to compare with: {compare} holds no {script} of this processor and Python.")
 
 
-def _show(file: Path, record: Mapping[str, str], seen: Seen, yardsticks: Mapping[str, str]) -> None:
-    runs = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()] if file.exists() else []
-    alike = [run for run in runs if record.items() <= run.items()]
-    if not alike:
-        print(f"Nothing to compare with: {file} holds no {record['script']} of this processor and Python.")
-        return
-    title = f"against {alike[-1]['at']}, commit {alike[-1]['commit']}"
-    table = Table(title=title, title_justify="left")
+def _show(then: Mapping[str, Any], seen: Seen, yardsticks: Mapping[str, str]) -> None:
+    table = Table(title=f"against {then['at']}, commit {then['commit']}", title_justify="left")
     for heading in ("what", "in", "then", "now", "now / then", "noise", ""):
         table.add_column(heading, justify="left" if heading in ("what", "in") else "right")
-    for name, change in changes(alike[-1]["seen"], seen, yardsticks).items():
+    for name, change in changes(then["seen"], seen, yardsticks).items():
         ratio, noise = f"{change.now / change.then:.2f}", f"{100 * change.noise:.0f} %"
         mark = ("machine" if name in yardsticks.values() else "SLOWER") if change.is_slower else ""
         figures = f"{change.then:.3g}", f"{change.now:.3g}", ratio, noise
