@@ -245,7 +245,7 @@ def test_force_bounding_holds_two_b_over_t_and_is_left_out_where_that_is_next_to
 @pytest.mark.slow
 def test_inertia_as_the_page_tuned_it_holds_more_than_nothing_behind_a_cable_under_seeds_of_neither_set():
     loop, rungs = loop_of("premium15_cable"), tuple(2200.0 * times for times in (0.4, 0.7, 0.85, 1.0, 1.2, 1.45))
-    cases = [draw(ranges(loop), 3, seed, 3) for seed in range(1, 6)]
+    cases = [draw(ranges(loop), 3, seed, 3) for seed in range(1, 13)]
     elements = (families.NOTHING.elements(()), families.BIDIRECTIONAL.elements((0.29e-3,)))
     with Trial(Store()) as trial:
         found = tried(trial, [Query(loop, some, each, rungs) for some in elements for each in cases], 0.08)
