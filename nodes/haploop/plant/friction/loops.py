@@ -97,10 +97,8 @@ def _walk(
             for j in range(size):
                 course[step + 1, j], course[step + 1, size + j] = z[j], comp[j]
             course[step, 2 * size + 2], course[step, 2 * size + 3] = made.friction, made.is_stuck
-            course[step, 2 * size + 4], course[step, 2 * size + 5] = (
-                slipping_at(of, mode, z[of.v]),
-                mode.is_stuck,
-            )
+            course[step, 2 * size + 4] = slipping_at(of, mode, z[of.v])
+            course[step, 2 * size + 5] = mode.is_stuck
             step += 1
     return mode
 
@@ -113,33 +111,15 @@ def _row(rows, at):  # pragma: no cover
 
 @_code.compiled
 def _advance(
-    mass_kg,
-    speed_up,
-    rows,
-    whole,
-    tables,
-    held,
-    laws,
-    free,
-    clamped,
-    loads,
-    ends,
-    first_step,
-    courses,
-    modes,
-    pieces,
-    upto,
-    member,
-):  # pragma: no cover
+    mass_kg, speed_up, rows, whole, tables, held, laws, free, clamped, loads, ends, first_step, courses, modes, pieces,
+    upto, member,
+):  # pragma: no cover  # fmt: skip
     """Moves members through an interval, from one on; returns the first one whose pieces there is no room for."""
     members, n, size = courses.shape[2], courses.shape[0] - 1, tables.shape[2]
     force, change = _row(rows, 0), _row(rows, 1)
     halving, room = substeps.Halving(whole[1], whole[2]), np.empty((5, size))
-    some, load, forced = (
-        np.empty((_TOGETHER, n + 1, 2 * size + 6)),
-        np.empty((_TOGETHER, n + 1)),
-        np.empty((2, n + 1, size)),
-    )
+    some, load = np.empty((_TOGETHER, n + 1, 2 * size + 6)), np.empty((_TOGETHER, n + 1))
+    forced = np.empty((2, n + 1, size))
     while member < members:
         many, done = min(_TOGETHER, members - member), 0
         for step in range(n + 1):
