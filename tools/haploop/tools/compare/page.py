@@ -86,7 +86,8 @@ def sentences(comparisons: Sequence[Comparison]) -> list[str]:
     adaptive = "; ".join(versus(*pair, loops) for pair in _ADAPTIVE)
     return [
         f"As described, most is held {'; '.join(_most(told.name, told.loops[0]) for told in comparisons)}.",
-        f"Take {take}: each the first in the list that is told to hold more than no element, and less than no other.",
+        f"Take {take}: each the first in the list that is told to hold more than no element and less than no other, "
+        "nothing where none is.",
         _sentence(versus(DAMPING, NOTHING, loops)),
         _sentence(inertia),
         _sentence(f"{adaptive}; {_verdict(loops)}"),

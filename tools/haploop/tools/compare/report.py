@@ -25,9 +25,10 @@ READING = (
     "element under the same seed, mean and 95 % interval over the seeds. Contact: slope of the force on the first way "
     "in. Ripple: of the command above 30 Hz, peak to peak. Extra: the element's own force, largest and root mean "
     "square. ±20 %: what is held with all parameters, or the device, 20 % less and 20 % more, over that without. "
-    "Breaks first: the softest wall that failed under any seed. * a parameter at the end of its search, † no wall was "
-    "too stiff: with others more may be held. ▲ ▼ told to hold more, or less, than none: by three standard errors, the "
-    "same way under two sets of seeds, each with its own tuning. Bold: not told from the best by the same rule."
+    "Breaks first: the softest wall that failed under any seed. * a parameter at the end of its search, whose smallest "
+    "is about none; † no wall was too stiff: with others more may be held. ▲ ▼ told to hold more, or less, than none: "
+    "by three standard errors, the same way under two sets of seeds, each with its own tuning. Bold: not told from the "
+    "best by the same rule."
 )
 SIGNS = {"more": " ▲", "less": " ▼", "alike": ""}
 _TIED = "{0} renders most, {1}; it cannot be told apart from {2}."
