@@ -47,6 +47,7 @@ def test_a_swing_that_goes_on_is_a_limit_cycle_and_its_width_is_the_oscillation(
     word, figures, _ = judged(lambda t: -0.061 + 1e-3 * np.sin(2 * math.pi * hz * t))
     assert word == "limit-cycle"
     assert figures.oscillation_m == pytest.approx(2e-3, rel=1e-3)
+    assert figures.force_ripple_N == pytest.approx(0.2 if hz > 30.0 else 0.0, rel=0.05, abs=4e-3)
 
 
 def test_a_swing_that_dies_away_is_steady():
@@ -54,7 +55,9 @@ def test_a_swing_that_dies_away_is_steady():
 
 
 def test_a_slow_way_into_the_wall_is_no_limit_cycle_however_long_it_is():
-    assert judged(lambda t: -0.0601 - 5e-3 * t)[0] == "steady"
+    word, figures, _ = judged(lambda t: -0.0601 - 5e-3 * t)
+    assert word == "steady"
+    assert figures.force_ripple_N < 1e-12
     assert judged(lambda t: -0.0601 - 5e-3 * t + 1e-4 * np.sin(400 * t))[0] == "limit-cycle"
 
 

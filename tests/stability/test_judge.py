@@ -13,7 +13,8 @@ from haploop.launch.scene.file import load
 from haploop.launch.stability.decide import Finding, decide
 from haploop.launch.stability.judge import judge
 from haploop.launch.stability.swing import Pushed, Swing, measure
-from haploop.launch.stability.traces import frequency_Hz, is_felt, ripple, sizes, smallest_felt_m, trend, widths
+from haploop.launch.stability.traces import frequency_Hz, is_felt, sizes, smallest_felt_m, trend, widths
+from haploop.logger.verdict.ripple import ripple
 from haploop.protocol.scene.effects import Friction
 from helpers.runs.judged import ended, found
 from helpers.scenes.least import scene
@@ -113,6 +114,22 @@ def test_the_share_of_a_swing_that_is_the_loops_own_is_what_remains_of_it(stiffn
     tables = {**pressed(), "hand": {"force": force}, "wall": {"position": 0.0, "stiffness": stiffness}}
     summary = run_in_process(scene(**tables, encoder={"resolution": 2e-5}, run={"verdict": "pushed"}), registry())
     assert least <= summary["stability"]["own_share"] <= most
+
+
+def test_a_steady_loop_that_noise_shakes_tells_the_ripple_of_the_run_and_what_moved_it():
+    tables = {**pressed(), "wall": {"position": 0.0, "stiffness": 500.0}, "run": {"verdict": "pushed"}}
+    still = run_in_process(scene(**tables), registry())
+    shaken = run_in_process(scene(**tables, noise={"deviation": 3e-5, "cutoff": 400.0}), registry())
+    assert {still["verdict"], shaken["verdict"]} == {"steady"}
+    assert still["window"]["force_ripple_N"] < 0.01 < 0.05 < shaken["window"]["force_ripple_N"]
+    assert (still["stability"]["moved_beside"], shaken["stability"]["moved_beside"]) == ([], ["noise"])
+    assert shaken["stability"]["force_ripple_N"] < 0.001
+
+
+def test_of_a_swing_that_nothing_beside_the_loop_moves_no_share_is_told():
+    finding = Finding("limit-cycle", "lasts", width_m=1e-3)
+    assert finding.entries(1.2e-3)["stability"]["own_share"] is None
+    assert finding.entries(1.2e-3, ["noise"])["stability"]["own_share"] == pytest.approx(1 / 1.2)
 
 
 def test_no_share_is_told_of_a_run_that_swung_less_than_its_loop_does():

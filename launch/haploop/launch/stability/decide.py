@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -30,7 +31,7 @@ _COUNTS = 10
 WHY = {
     "diverged": "The run ended by itself: {detail}.",
     "no contact": "No tick of the last half second, or of the second half of a shorter run, was in contact.",
-    "rest": "After a push of {push_N:.3g} N it came to rest; what else moved was the hand or noise.",
+    "rest": "After a push of {push_N:.3g} N it came to rest.",
     "unfelt": "After a push of {push_N:.3g} N it came to rest but for {width_um:.3g} um peak to peak at "
     "{frequency_Hz:.3g} Hz, less than a hand feels ({felt_um:.3g} um).",
     "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width_mm:.3g} mm peak to peak at "
@@ -102,13 +103,17 @@ class Finding:
         """Returns the finding with what was found after a harder push."""
         return replace(self, blow_N=found.push_N, blown=_BLOWN.get(found.word, found.word))
 
-    def entries(self, seen_m: float | None = None) -> dict[str, Any]:
+    def entries(self, seen_m: float | None = None, beside: Sequence[str] = ()) -> dict[str, Any]:
         """Returns what a summary tells of it: the word, why as a sentence, and the numbers as its ``stability``.
 
-        ``seen_m`` is how far the run itself swung at its end, peak to peak.
+        Args:
+            seen_m: how far the run itself swung at its end, peak to peak.
+            beside: what else moved the run there, see ``moved_beside``.
         """
         numbers = {name: value for name, value in vars(self).items() if name not in ("word", "detail")}
-        numbers["own_share"] = self.own_share(seen_m)
+        # A swing that nothing else moves is the loop's own, and differs from the one after a push by chance alone.
+        is_told = beside or self.word == "steady"
+        numbers |= {"own_share": self.own_share(seen_m) if is_told else None, "moved_beside": [*beside]}
         return {"verdict": self.word, "verdict_rule": self.sentence(), "stability": numbers}
 
     def own_share(self, seen_m: float | None) -> float | None:
@@ -185,7 +190,9 @@ def _finding(swing: Swing, word: str, why: str) -> Finding:
         needs_s = max(needs_s, swing.watched_s * max(2.0, 4.0 * error / max(abs(change), 1e-12)))
         if swing.rate_1_s < 0.0:
             needs_s = max(needs_s, swing.watched_s + math.log(max(swing.width_m / felt_m, 1.0)) / -swing.rate_1_s)
+    # What is left of a swing that came to rest is rounding, which swings at no frequency.
+    frequency_Hz, ripple_N = (0.0, 0.0) if swing.width_m < REST_M else (swing.frequency_Hz, swing.ripple_N)
     return Finding(
-        word, why, swing.push_N, swing.watched_s, swing.rate_1_s, swing.error_1_s, swing.frequency_Hz, swing.width_m,
-        swing.spread_m, swing.ripple_N, swing.width_m >= felt_m, None, needs_s, most_1_s,
+        word, why, swing.push_N, swing.watched_s, swing.rate_1_s, swing.error_1_s, frequency_Hz, swing.width_m,
+        swing.spread_m, ripple_N, swing.width_m >= felt_m, None, needs_s, most_1_s,
     )  # fmt: skip

@@ -21,6 +21,7 @@ from haploop.launch.stability.looks import (
     findings,
     is_struck,
     left_limit,
+    moved_beside,
     parts,
     push_of,
     watch_times,
@@ -114,7 +115,9 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
         finding = Finding("diverged", "diverged", detail=summary["why"])
     else:
         return summary
-    summary = finite(summary | finding.entries(summary["window"]["oscillation_m"]))
+    summary = finite(
+        summary | finding.entries(summary["window"]["oscillation_m"], moved_beside(scene, summary["window"]["from_s"]))
+    )
     if out:
         write_summary(summary, out)
     return summary

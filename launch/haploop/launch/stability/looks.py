@@ -58,6 +58,18 @@ def is_struck(scene: Scene, found: Finding) -> bool:
     return found.word == "steady" and found.why != "decays" and (scene.friction is not None or saturates)
 
 
+def moved_beside(scene: Scene, from_s: float) -> list[str]:
+    """Returns what moves a run beside its loop after a time in s: hand, noise, both, or none."""
+    force = scene.hand and scene.hand.force
+    at_rest_s = {"ramp": "rise_time", "minimum-jerk": "rise_time", "step": "at"}
+    still = force is None or force.kind == "constant"
+    if force is not None and force.kind in at_rest_s:
+        still = getattr(force, at_rest_s[force.kind]) <= from_s
+    is_noisy = scene.noise is not None or (scene.accelerometer is not None and scene.accelerometer.noise_density > 0.0)
+    unmodelled = scene.hand is not None and scene.hand.kind == "unmodelled"
+    return ["the hand's motion"] * (unmodelled or not still) + ["noise"] * is_noisy
+
+
 def failed(push_N: float, seconds: float, detail: str) -> Finding:
     return Finding("undecided", "failed", abs(push_N), seconds, detail=detail)
 

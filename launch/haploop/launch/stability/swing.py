@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from haploop.launch.stability.traces import frequency_Hz, ripple, sizes, trend, widths
+from haploop.launch.stability.traces import frequency_Hz, sizes, trend, widths
+from haploop.logger.verdict.ripple import ripple
 
 # Pieces in which the width of a swing is measured, and the periods that one covers at least.
 PIECES, FEW_PIECES = 24, 8

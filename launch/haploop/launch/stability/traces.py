@@ -1,4 +1,4 @@
-"""Measures of a swing: how wide, at which frequency, how fast it grows, its force, and whether a hand feels it."""
+"""Measures of a swing: how wide, at which frequency, how fast it grows, and whether a hand feels it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Swings of the command slower than this are the hand's and the task's; faster ones are felt as a buzz.
-RIPPLE_ABOVE_HZ = 30.0
 # Widths below this are rounding.
 LEAST_WIDTH_M = 1e-15
 # Frequency in Hz and smallest amplitude in m that is felt, 0 to peak (Israr, Choi and Tan 2006, three of their points).
@@ -82,19 +80,6 @@ def frequency_Hz(x: np.ndarray, rate: float) -> np.ndarray:
     count = x.shape[-1]
     power = np.abs(np.fft.rfft((x - x.mean(axis=-1, keepdims=True)) * np.hanning(count)))[..., 1:]
     return np.where(power.any(axis=-1), np.fft.rfftfreq(count, 1.0 / rate)[1 + np.argmax(power, axis=-1)], 0.0)
-
-
-def ripple(force_N: np.ndarray, rate: float) -> np.ndarray:
-    """Returns what a force, sampled at ``rate`` in Hz, swings by above ``RIPPLE_ABOVE_HZ``, peak to peak in N.
-
-    ``force_N`` is of shape (..., samples).
-    """
-    count = force_N.shape[-1]
-    if count < 4:
-        return np.zeros(force_N.shape[:-1])
-    spectrum = np.fft.rfft(force_N - force_N.mean(axis=-1, keepdims=True))
-    spectrum[..., np.fft.rfftfreq(count, 1.0 / rate) < RIPPLE_ABOVE_HZ] = 0.0
-    return np.ptp(np.fft.irfft(spectrum, count), axis=-1)
 
 
 def smallest_felt_m(frequency_Hz: float) -> float:

@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from haploop.logger.verdict.ripple import ripple
+
 WINDOW_S = 0.5
 CROSSINGS = 4
 # Below this, swinging is no limit cycle whatever the encoder: a thousandth of what a wall of 1 N/mm gives way to 1 N.
@@ -26,6 +28,7 @@ class Figures(NamedTuple):
         displayed_stiffness_N_m: mean of total force over penetration, ticks in contact (Choi et al. 2022, V.B.2), but
             those whose penetration is a rounding error of the wall's position; None of none.
         penetration_mean_m: ticks in contact; None of none.
+        force_ripple_N: of the commanded force, peak to peak; see ``ripple``.
     """
 
     from_s: float
@@ -34,6 +37,7 @@ class Figures(NamedTuple):
     outside_fraction: float
     displayed_stiffness_N_m: float | None
     penetration_mean_m: float | None
+    force_ripple_N: float
 
 
 class WindowMeasures(NamedTuple):
@@ -48,7 +52,7 @@ class WindowMeasures(NamedTuple):
 class MeasuredColumns(NamedTuple):
     """Measures of the windows of some runs, a list each: of ``swings``, the width peak to peak, the ticks in contact.
 
-    Displayed stiffness and penetration are means of ticks in contact, None of none.
+    Displayed stiffness and penetration are means of ticks in contact, None of none; the ripple is that of the command.
     """
 
     crossings: list[int]
@@ -57,6 +61,7 @@ class MeasuredColumns(NamedTuple):
     inside: list[int]
     stiffness_N_m: list[float | None]
     depth_m: list[float | None]
+    ripple_N: list[float]
 
 
 class Extremes(NamedTuple):
@@ -119,13 +124,14 @@ def window_span(ran: int, keep: int, steps_per_tick: int) -> Span:
 
 
 def measure_window(
-    x: np.ndarray, rows: dict[str, np.ndarray], span: Span, rate: int, swing_m: np.ndarray
+    x: np.ndarray, rows: dict[str, np.ndarray], span: Span, rate: int, control_rate: int, swing_m: np.ndarray
 ) -> list[WindowMeasures]:
     """Returns the measures of the windows of some runs; each is worked out as if it were alone.
 
     Args:
         x: positions at the last plant steps at least, shape (runs, steps), m.
         rows: ``CONTROLLER_COLUMNS`` at the last ticks at least, shape (runs, ticks).
+        rate, control_rate: plant steps and ticks a second.
         swing_m: what does not count as a swing, shape (runs,).
     """
     x = x[:, -span.steps - 1 :]
@@ -140,6 +146,7 @@ def measure_window(
         np.count_nonzero(inside, axis=1).tolist(),
         _means(stiffness, real),
         _means(np.abs(depth), inside),
+        ripple(held["total"], control_rate).tolist(),
     )
     return window_measures(measured, span, rate)
 
@@ -148,11 +155,11 @@ def window_measures(measured: MeasuredColumns, span: Span, rate: int) -> list[Wi
     """Returns the measures of each run's window, with the figures of the summary."""
     start_s, seconds = span.first / rate, (span.steps + 1) / rate
     measures = []
-    for crossings, growth, width_m, inside, stiffness_N_m, depth_m in zip(*measured, strict=True):
+    for crossings, growth, width_m, inside, stiffness_N_m, depth_m, ripple_N in zip(*measured, strict=True):
         # What is `growth` times as wide in the second half of the window follows e^(r t).
         rate_1_s = 2.0 * math.log(growth) / seconds if crossings >= CROSSINGS and growth > 0.0 else None
         outside = (span.ticks - inside) / span.ticks if span.ticks else 1.0
-        figures = Figures(start_s, width_m, rate_1_s, outside, stiffness_N_m, depth_m)
+        figures = Figures(start_s, width_m, rate_1_s, outside, stiffness_N_m, depth_m, ripple_N)
         measures.append(WindowMeasures(inside > 0, crossings, growth, figures))
     return measures
 

@@ -97,17 +97,17 @@ class Window:
         span = window_span(s.steps, keep_steps(rate), n)
         for first in range(0, len(wanted), _TOGETHER):
             some = wanted[first : first + _TOGETHER]
-            x = _read(s.x, s.steps + len(s.x), some)
-            rows = {name: _read(ring, s.steps // n, some) for name, ring in s.rows.items()}
+            x = last_rows(s.x, s.steps + len(s.x), some)
+            rows = {name: last_rows(ring, s.steps // n, some) for name, ring in s.rows.items()}
             swing_m = self.swing_m[some]
-            windows = measure_window(x, rows, span, rate, swing_m)
+            windows = measure_window(x, rows, span, rate, self._time.control_rate, swing_m)
             yield from map(RunMeasures, windows, self.extremes(some), swing_m.tolist())
 
     def contacts(self, places: np.ndarray) -> np.ndarray:
         """Returns whether each tick of the window was in contact, shape (places, ticks); at least the last tick's."""
         ran = self.state.steps // self._time.steps_per_tick
         ticks = ran - max(ran // 2, ran - self._time.control_rate // 2)
-        return _read(self.state.rows["in_contact"], ran, places)[:, -ticks:] > 0.0
+        return last_rows(self.state.rows["in_contact"], ran, places)[:, -ticks:] > 0.0
 
     def extremes(self, places: np.ndarray) -> Iterator[Extremes]:
         s = self.state
@@ -128,7 +128,7 @@ def _write(ring: np.ndarray, at: int, rows: np.ndarray) -> None:
         ring[: len(rows) - before_wrap] = rows[before_wrap:]
 
 
-def _read(ring: np.ndarray, end: int, places: np.ndarray) -> np.ndarray:
+def last_rows(ring: np.ndarray, end: int, places: np.ndarray) -> np.ndarray:
     """Returns the rows before ``end`` that a ring still holds, oldest first, of some members; shape (members, rows)."""
     count = min(end, len(ring))
     first = (end - count) % len(ring)

@@ -95,6 +95,8 @@ def key_numbers(run: RunData) -> list[str]:
         return [f"{'log cut off' if run.cut else 'no summary'}: {last - first:g} s of {run.scene.duration:g} s"]
     window, energy = run.summary["window"], run.summary["energy"]
     words = [f"in the last {last - window['from_s']:.3g} s: oscillation {amount(window['oscillation_m'], 'm')}"]
+    if (ripple_N := window.get("force_ripple_N")) is not None:
+        words[0] += f", force ripple {amount(ripple_N, 'N')}"
     if (found := run.summary.get("stability", {})).get("rate_1_s") is not None:
         words.append(f"pushed, it swings {swing_words(found)}")
     if run.history.walls and run.summary["verdict"] != "no-contact":

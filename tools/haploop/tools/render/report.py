@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from haploop.protocol.transport.wire import Message
 
 _ITS_WORD = "That the {} does what the scene says is its own word; haploop replay holds it against the scene."
+_TRIED = "this hold, pushed by up to {}; haploop advise tries taps, other holds and devices"
+_SWINGS_ON = "Steady for small pushes alone: after the blow it swings on."
 # Entry of the summary, the count in it, and its words.
 _COUNTS = (
     ("lost", "commands_dropped", "commands dropped"),
@@ -68,7 +70,8 @@ def summary_table(summary: Summary) -> RenderableType:
     parts: list[RenderableType] = [head, Text(f"{rule[:1].upper()}{rule[1:]}.", style="dim")]
     if summary["ended"] not in ("done", "diverged"):
         parts.append(Text(f"ended early: {summary['ended']}", style="bold red"))
-    told_too = [*summary.get("not_made", ()), *filter(None, [summary["energy"].get("balance")])]
+    swings_on = [_SWINGS_ON] * (summary.get("stability", {}).get("blown") == "swings on")
+    told_too = [*summary.get("not_made", ()), *swings_on, *filter(None, [summary["energy"].get("balance")])]
     parts += [Text(sentence, style="bold yellow") for sentence in told_too]
     parts += [Text(_ITS_WORD.format(words.split()[0])) for words, _ in _programs(summary)]
     control_rate = summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
@@ -86,13 +89,19 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
         *_programs(summary),
         ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak at its end"),
     ]
-    figures += _stability(summary.get("stability", {}))
+    if (ripple_N := window.get("force_ripple_N")) is not None:
+        figures.append(("force ripple > 30 Hz", f"{amount(ripple_N, 'N')} peak to peak at its end"))
+    found = summary.get("stability", {})
+    figures += _stability(found)
+    if summary["verdict"] == "steady" and "push_N" in found:
+        figures.append(("tried", _TRIED.format(amount(found["blow_N"] or found["push_N"], "N"))))
     if window["penetration_mean_m"] is not None:
         depth = f"{amount(window['penetration_mean_m'], 'm')} on average"
         outside = 100 * window["outside_fraction"]
         figures.append(("penetration", depth + (f", outside the wall {outside:.0f} % of the time" if outside else "")))
     if window["displayed_stiffness_N_m"] is not None:
-        figures.append(("displayed stiffness", spring(window["displayed_stiffness_N_m"])))
+        beyond = " at the motor; the cable gives way, too" if "cable_heat_J" in summary["energy"] else ""
+        figures.append(("displayed stiffness", spring(window["displayed_stiffness_N_m"]) + beyond))
     if happened := count_losses(summary):
         figures.append(("in all", ", ".join(f"{count} {words}" for words, count in happened.items())))
     return figures
@@ -168,14 +177,17 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     """Returns what a loop does, held still and pushed at its end; nothing where it was not watched to an answer."""
     if found.get("rate_1_s") is None:
         return []
-    rows = [
-        ("pushed, it swings", swing_words(found)),
-        ("force ripple > 30 Hz", f"{amount(found['force_ripple_N'], 'N')} peak to peak"),
-        ("growth", f"{found['rate_1_s']:.3g} +- {found['error_1_s']:.2g} 1/s, watched for {found['watched_s']:g} s"),
-    ]
+    rows = [("pushed, it swings", swing_words(found))]
+    if not rests(found):
+        watched = f"watched for {found['watched_s']:g} s"
+        rows += [
+            ("its force > 30 Hz", f"{amount(found['force_ripple_N'], 'N')} peak to peak"),
+            ("growth", f"{found['rate_1_s']:.3g} +- {found['error_1_s']:.2g} 1/s, {watched}"),
+        ]
     if (share := found.get("own_share")) is not None:
+        beside = found.get("moved_beside", ("the hand's motion", "noise"))
         own = f"{100 * share:.0f} %" if share >= 0.01 else "less than 1 %"
-        rows.append(("of the oscillation", f"{own} its own; else the hand's motion, noise, or dying away"))
+        rows.append(("of the oscillation", f"{own} its own; else {' or '.join([*beside, 'dying away'])}"))
     if blown := found.get("blown"):
         rows.append(("after a blow", f"of {amount(found['blow_N'], 'N')}: {blown}"))
     return rows
@@ -183,11 +195,16 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
 
 def swing_words(found: Summary) -> str:
     """Returns size, frequency and feel of the swing that a pushed loop comes to, given a summary's ``stability``."""
-    rests = found["width_m"] < 1e-9  # what is left is rounding
-    frequency = "" if rests or not found["frequency_Hz"] else f"at {amount(found['frequency_Hz'], 'Hz')}, "
-    size = "less than 1 nm" if rests else f"{amount(found['width_m'], 'm')} +- {amount(found['spread_m'], 'm', 2)}"
+    frequency = "" if rests(found) or not found["frequency_Hz"] else f"at {amount(found['frequency_Hz'], 'Hz')}, "
+    width = f"{amount(found['width_m'], 'm')} +- {amount(found['spread_m'], 'm', 2)}"
+    size = "less than 1 nm" if rests(found) else width
     felt, chaotic = "felt" if found["felt"] else "not felt", ", chaotic" if found["chaotic"] else ""
     return f"{size} peak to peak, {frequency}{felt}{chaotic}"
+
+
+def rests(found: Summary) -> bool:
+    """Tells of a summary's ``stability`` whether what is left of a push is rounding."""
+    return found["width_m"] < 1e-9
 
 
 def status_table(data: Message) -> RenderableType:

@@ -12,7 +12,8 @@ import numpy as np
 
 from haploop.launch.batch.jax.block import Rings
 from haploop.logger.verdict.measures import ROUNDING, MeasuredColumns, RunMeasures, window_measures, window_span
-from haploop.logger.verdict.window import Window, keep_steps
+from haploop.logger.verdict.ripple import ripple
+from haploop.logger.verdict.window import Window, keep_steps, last_rows
 
 
 class CompiledWindow(Window):
@@ -38,7 +39,10 @@ class CompiledWindow(Window):
         rows = {**self.rings.rows, "wall_position": self.state.rows["wall_position"]}
         found = _look(self.rings.x, rows, np.int64(steps), self.swing_m, steps=span.steps + 1, ticks=span.ticks)
         columns = [np.asarray(column)[wanted].tolist() for column in found]
-        measured = MeasuredColumns(*columns[:4], *(_where_any(*columns[at : at + 2]) for at in (4, 6)))
+        means = [_where_any(*columns[at : at + 2]) for at in (4, 6)]
+        # Gone through once a run: a transform by NumPy costs less than a program for it.
+        command = last_rows(np.asarray(self.rings.rows["total"]), steps // n, wanted)[:, -span.ticks :]
+        measured = MeasuredColumns(*columns[:4], *means, ripple(command, self._time.control_rate).tolist())
         yield from map(
             RunMeasures, window_measures(measured, span, rate), self.extremes(wanted), self.swing_m[wanted].tolist()
         )
@@ -59,7 +63,7 @@ class _Swings(NamedTuple):
 
 @partial(jax.jit, static_argnames=("steps", "ticks"))
 def _look(x: Any, rows: dict[str, jax.Array], ran: Any, swing_m: Any, *, steps: int, ticks: int) -> list[Any]:
-    """Returns the columns of ``MeasuredColumns``, with the counts before each mean; see ``measure_window``.
+    """Returns the columns of ``MeasuredColumns`` but the ripple, the counts before each mean; see ``measure_window``.
 
     Args:
         x: positions, shape (ticks kept, n, members); rows: ``CONTROLLER_COLUMNS``, shape (ticks kept, members).

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from haploop.launch.stability.traces import RIPPLE_ABOVE_HZ, smallest_felt_m
+from haploop.launch.stability.traces import smallest_felt_m
+from haploop.logger.verdict.ripple import RIPPLE_ABOVE_HZ
 from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.scene import Scene
 
