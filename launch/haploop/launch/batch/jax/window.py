@@ -39,10 +39,11 @@ class CompiledWindow(Window):
         rows = {**self.rings.rows, "wall_position": self.state.rows["wall_position"]}
         found = _look(self.rings.x, rows, np.int64(steps), self.swing_m, steps=span.steps + 1, ticks=span.ticks)
         columns = [np.asarray(column)[wanted].tolist() for column in found]
-        means = [_where_any(*columns[at : at + 2]) for at in (4, 6)]
+        stiffness, depth = (_where_any(*columns[at : at + 2]) for at in (4, 6))
         # Gone through once a run: a transform by NumPy costs less than a program for it.
         command = last_rows(np.asarray(self.rings.rows["total"]), steps // n, wanted)[:, -span.ticks :]
-        measured = MeasuredColumns(*columns[:4], *means, ripple(command, self._time.control_rate).tolist())
+        ripples = ripple(command, self._time.control_rate).tolist()
+        measured = MeasuredColumns(*columns[:4], stiffness, depth, ripples)
         yield from map(
             RunMeasures, window_measures(measured, span, rate), self.extremes(wanted), self.swing_m[wanted].tolist()
         )
