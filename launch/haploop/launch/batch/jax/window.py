@@ -38,12 +38,12 @@ class CompiledWindow(Window):
         wanted = np.fromiter(places, np.intp)
         rows = {**self.rings.rows, "wall_position": self.state.rows["wall_position"]}
         found = _look(self.rings.x, rows, np.int64(steps), self.swing_m, steps=span.steps + 1, ticks=span.ticks)
-        columns = [np.asarray(column)[wanted].tolist() for column in found]
-        stiffness, depth = (_where_any(*columns[at : at + 2]) for at in (4, 6))
+        crossings, growth, width, inside, *means = (np.asarray(column)[wanted].tolist() for column in found)
+        stiffness, depth = _where_any(*means[:2]), _where_any(*means[2:])
         # Gone through once a run: a transform by NumPy costs less than a program for it.
         command = last_rows(np.asarray(self.rings.rows["total"]), steps // n, wanted)[:, -span.ticks :]
         ripples = ripple(command, self._time.control_rate).tolist()
-        measured = MeasuredColumns(*columns[:4], stiffness, depth, ripples)
+        measured = MeasuredColumns(crossings, growth, width, inside, stiffness, depth, ripples)
         yield from map(
             RunMeasures, window_measures(measured, span, rate), self.extremes(wanted), self.swing_m[wanted].tolist()
         )
