@@ -11,7 +11,7 @@ import pytest
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Encoder, Scene
 from haploop.tools.advise import families
-from haploop.tools.advise.families import STABILIZERS, Family, halton
+from haploop.tools.advise.families import STABILIZERS, Family, Values, halton
 from haploop.tools.advise.subject import make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop, ranges
 from haploop.tools.advise.walls.limit import Query
@@ -119,7 +119,11 @@ def test_every_stabilizer_has_the_same_effort_and_the_search_goes_where_most_is_
 
 
 def test_of_what_holds_as_much_within_a_standard_error_the_least_force_is_taken():
-    held_N_m = {(9.0,): [900.0, 1100.0, 1000.0], (5.0,): [950.0, 990.0, 1040.0], (1.0,): [700.0, 800.0, 750.0]}
+    held_N_m: dict[Values, list[float]] = {
+        (9.0,): [900.0, 1100.0, 1000.0],
+        (5.0,): [950.0, 990.0, 1040.0],
+        (1.0,): [700.0, 800.0, 750.0],
+    }
     known = {values: Shown(np.array(of), np.full(3, values[0])) for values, of in held_N_m.items()}
     assert gentlest(known) == (5.0,)
     assert gentlest({values: each for values, each in known.items() if values != (5.0,)}) == (9.0,)
