@@ -63,6 +63,30 @@ def test_every_link_of_a_document_leads_to_a_file(document: Path) -> None:
     assert [link for link in missing if link not in generated] == []
 
 
+def anchors_of(text: str) -> set[str]:
+    """The anchors that headings and ids give a page."""
+    heads = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    plain = [re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", head).strip().lower() for head in heads]
+    return {re.sub(r"[^\w\- ]", "", head).replace(" ", "-") for head in plain} | set(re.findall(r'id="([^"]+)"', text))
+
+
+def test_every_anchor_that_a_document_links_to_is_in_the_page():
+    lost = []
+    for document in (*DOCUMENTS, HOUSE / "examples/README.md"):
+        for file, anchor in re.findall(r"\]\(([^):#]*)#([^)]+)\)", document.read_text(encoding="utf-8")):
+            page = document.parent / file if file else document
+            if page.suffix == ".md" and page.exists() and anchor not in anchors_of(page.read_text(encoding="utf-8")):
+                lost.append(f"{document.name}: {file}#{anchor}")
+    assert lost == []
+
+
+@pytest.mark.parametrize("name", ["notebook.ipynb", "plotjuggler_layout.xml", "foxglove_layout.json"])
+def test_a_file_that_the_guides_offer_is_part_of_the_site(name):
+    left_out = re.search(r"^exclude_docs: \|\n((?:  .*\n)+)", (HOUSE / "mkdocs.yml").read_text(encoding="utf-8"), re.M)
+    assert left_out
+    assert not any(Path(name).match(pattern.strip()) for pattern in left_out[1].splitlines())
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_every_make_target_that_a_document_names_is_one(document: Path) -> None:
     text = document.read_text(encoding="utf-8")

@@ -26,6 +26,9 @@ ELSEWHERE = {
     "protocol.md": "protocol/README.md",
     "examples.md": "examples/README.md",
 }
+# What README says of the site, and what the site says in its place.
+_MADE = "`make docs`, which makes these pages a site, with a reference that is generated from the code"
+_HERE = ", ".join(f"[{page}](docs/reference/{page}.md)" for page in ("scene", "commands", "summary", "log", "api"))
 _LINK = re.compile(r"(!?)\[((?:[^\]\[]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 
 
@@ -58,5 +61,9 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         relative = posixpath.relpath(found, posixpath.dirname(here) or ".")
         return f"{picture}[{text}]({relative}{'#' * bool(anchor)}{anchor})"
 
+    if here == "index.md":
+        if _MADE not in markdown:
+            raise ValueError(f"README.md no longer says {_MADE!r}, in whose place the site names its reference.")
+        markdown = markdown.replace(_MADE, f"the reference: {_HERE}")
     parts = re.split(r"(^```.*?^```$)", markdown, flags=re.MULTILINE | re.DOTALL)
     return "".join(part if part.startswith("```") else _LINK.sub(led, part) for part in parts)

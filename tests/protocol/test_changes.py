@@ -157,7 +157,7 @@ def test_a_refusal_in_the_log_is_a_field_that_names_the_change(tmp_path: Path) -
     (refused,) = [event for _, event in events if "refused" in event]
     assert refused["change"] == {"tick": 10, "swap": CHOOSY, "element": 0}
     reason = "ElementError: The element choosy cannot be made with force_N = 0.5: ValueError: too strong"
-    assert refused["refused"].endswith(f"was refused: {reason}")
+    assert f"was refused: {reason} (test_changes.py, line " in refused["refused"]
     assert [(change.tick, change.refused is None) for change in changes_of(events)] == [(10, False), (20, True)]
 
 

@@ -28,7 +28,7 @@ def elsewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize("name", ["fig6c", "fig6c.toml", "scenes/fig6c.toml"])
+@pytest.mark.parametrize("name", ["fig6c", "fig6c.toml", "scenes/fig6c.toml", "launch/scenes/fig6c.toml"])
 def test_a_scene_that_comes_with_haploop_is_found_by_its_name(name):
     assert load(name) == load(bundled("scenes")["fig6c"])
 

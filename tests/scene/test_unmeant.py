@@ -1,6 +1,7 @@
 """What is in order in a scene but cannot be meant: asked after in one line, and silent where it can be."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import haploop.logger
 from haploop.launch.plan.meant import RULES, note_unmeant
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
+from haploop.launch.scene.mistakes import SceneError
 from haploop.tools.cli.app import app
 from helpers.scenes.least import KINDS, WALL, scene
 
@@ -34,6 +36,11 @@ CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
      {"hand": PUSHED, "wall": {"position": 0.0005, "stiffness": 150}}, "10 mm deep in the wall"),
     ({"hand": PUSHED, "encoder": {"resolution": 1.0}}, {"hand": PUSHED, "encoder": {"resolution": 1e-5}},
      "encoder.resolution is 1 m; is that the unit"),
+    ({"hand": PUSHED, "device": {"mass": 50, "damping": 0.1}}, {"hand": PUSHED, "device": {"mass": 5, "damping": 0.1}},
+     "device.mass is 50 kg; is that the unit"),
+    ({"hand": PUSHED, "duration": 1e5}, {"hand": PUSHED, "duration": 1e4}, "The run has 1e+08 ticks"),
+    ({"hand": PUSHED, "dissipation": [{"kind": "damping", "damping": 1.0}]},
+     {"hand": PUSHED, "dissipation": [{"kind": "damping", "damping": 1.0, "acts": "always"}]}, "Nothing is ever in"),
 ]  # fmt: skip
 
 
@@ -96,3 +103,26 @@ def test_check_notes_what_cannot_be_meant_and_does_not_refuse_it():
     assert far.stderr.count("Note: The wall is at -60 m") == 1
     assert [note for note in json.loads(far.stdout)["notes"] if note.startswith("The wall is at -60 m")]
     assert json.loads(CliRunner().invoke(app, ["check", fig, "--json"]).stdout)["notes"] == []
+
+
+REPAIRS = {
+    "duration = 0.0003": "the least legal value is 0.001 s",
+    "duration = 1,5": "A decimal has a point and no comma: 1.5.",
+    "duration = 2 ms": 'A number with its unit is text, in quotes: "2 ms".',
+    'duration = "0,3 s"': 'A decimal has a point and no comma: "0.3 s".',
+    "duration = 1.0\n[dissipation]\nkind='damping'": "Tables of a list have two pairs of brackets: [[dissipation]].",
+    "": "haploop advise my.toml takes it as it is",
+}
+
+
+@pytest.mark.parametrize(("head", "words"), REPAIRS.items())
+def test_a_mistake_of_form_is_told_with_its_repair(tmp_path, head, words):
+    file = tmp_path / "my.toml"
+    file.write_text(f"{head}\n[device]\nmass = 0.05\ndamping = 0.0\n")
+    with pytest.raises(SceneError, match=re.escape(words)):
+        load(file)
+
+
+def test_notes_come_after_the_scene():
+    told = CliRunner().invoke(app, ["check", str(SCENES / "fig6c.toml"), "--set", "wall.position=-60"])
+    assert told.output.strip().splitlines()[-1].startswith("Note: The wall is at -60 m")

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NotRequired, TypedDict
 
 from haploop.controller.dissipation import Element, ElementError
+from haploop.controller.dissipation.element import raised
 from haploop.protocol.scene.scene import ElementTable
 
 
@@ -60,7 +61,7 @@ def make_element(table: ElementTable, kinds: Mapping[str, type[Element]]) -> tup
         return kinds[table.name](**table.parameters), table.acts
     except (Exception, SystemExit) as error:
         given = ", ".join(f"{name} = {value}" for name, value in table.parameters.items()) or "no parameters"
-        what = f"{type(error).__name__}: {error}"
+        what = raised(error, kinds.get(table.name))
         raise ElementError(f"The element {table.name} cannot be made with {given}: {what}") from error
 
 

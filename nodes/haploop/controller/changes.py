@@ -10,6 +10,7 @@ from pathlib import Path
 from haploop.controller.active_elements import ActiveElement, make_element
 from haploop.controller.asked import first_memory
 from haploop.controller.dissipation import Element, ElementError, load_plugin
+from haploop.controller.dissipation.element import place_in
 from haploop.controller.estimators.base import Sample
 from haploop.controller.recorder import MOTION_COLUMNS
 from haploop.controller.tick import ControllerParams, ControllerState, tick
@@ -73,7 +74,8 @@ def try_element(place: int, params: ControllerParams, state: ControllerState, sa
     x, force = row[0], row[len(MOTION_COLUMNS) + place]
     is_good = where(abs(x) < math.inf, abs(force) < math.inf, True)
     if not (is_good if isinstance(is_good, bool) else is_good.all()):
-        raise ElementError(f"it gave {force} when it was tried on the motion of this tick")
+        where_it_is = place_in(type(params.elements[place].element))
+        raise ElementError(f"it gave {force} when it was tried on the motion of this tick{where_it_is}")
 
 
 def take_back(

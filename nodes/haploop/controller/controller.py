@@ -11,6 +11,7 @@ from haploop.controller.active_elements import ActiveElement, make_element
 from haploop.controller.asked import Declared, shown
 from haploop.controller.changes import Kinds, apply_change, take_back, try_element
 from haploop.controller.dissipation import ElementError, Motion
+from haploop.controller.dissipation.element import place_in
 from haploop.controller.estimators.base import Sample
 from haploop.controller.estimators.choose import make_estimators
 from haploop.controller.recorder import Recorder
@@ -133,9 +134,10 @@ class Controller:
                 if change.swap is not None and change.swap.name != NO_ELEMENT:
                     try_element(change.element, params, after, sample)
             except NoForce as error:
-                self.recorder.refused.append(change.refuse(error.__cause__ or error))
+                cause, kind = error.__cause__ or error, type(params.elements[error.index].element)
+                self.recorder.refused.append(change.refuse(cause, place_in(kind, cause)))
             except (Exception, SystemExit) as error:
-                self.recorder.refused.append(change.refuse(error))
+                self.recorder.refused.append(change.refuse(error, place_in(None, error)))
             else:
                 self.params, state = params, after
         self._next_change = self._changes[0].tick if self._changes else _NEVER

@@ -11,7 +11,7 @@ import zmq
 from haploop.controller.controller import Controller
 from haploop.controller.deadline import heed_deadline
 from haploop.controller.dissipation import ElementError, PluginError, registry
-from haploop.controller.tick import places_of
+from haploop.controller.dissipation.element import places_of
 from haploop.protocol.changes import Event, is_change, refusals_as_status
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import BlockLength, Timebase

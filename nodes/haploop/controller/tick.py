@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from haploop.controller.active_elements import ActiveElement
 from haploop.controller.asked import Declared, Told, answer_of, first_memory
-from haploop.controller.dissipation.element import ASKABLE, Motion
+from haploop.controller.dissipation.element import ASKABLE, Motion, raised
 from haploop.controller.estimators.base import Estimator, Sample
 from haploop.protocol.arrays import where
 from haploop.protocol.walls.wall import Wall
@@ -54,9 +53,6 @@ class ControllerState(NamedTuple):
 StateTuple = tuple[Any, Any, Any, tuple[Any, ...]]
 
 
-_HERE = Path(__file__).parent
-
-
 class NoForce(Exception):
     """An element, by its index among the active ones, that gave no force; raised from what it raised."""
 
@@ -66,28 +62,11 @@ class NoForce(Exception):
 
     def sentence(self, params: ControllerParams, tick: int) -> str:
         """Returns what happened at this tick, with the element's kind and what it raised."""
-        kind, cause = params.elements[self.index].element.kind, self.__cause__
+        element, cause = params.elements[self.index].element, self.__cause__
         name = getattr(cause, "name", None)
         hint = f' It is told what it names in its class: asks = ("{name}",).' if name in ASKABLE else ""
-        what = f"{type(cause).__name__}: {cause}{_line(cause)}"
-        return f"Element {self.index} ({kind}) gave no force at tick {tick}: {what}.{hint}"
-
-
-def _line(error: BaseException | None) -> str:
-    """Returns the file and the line of an element's code at which it raised; nothing where that is not its code."""
-    *_, (file, line) = [("", 0), *places_of(error)]
-    return f" ({Path(file).name}, line {line})" if file else ""
-
-
-def places_of(error: BaseException | None) -> list[tuple[str, int]]:
-    """Returns the files and lines of elements through which an error came, the innermost last; none of this package."""
-    places, trace = [], error.__traceback__ if error else None
-    while trace:
-        file = trace.tb_frame.f_code.co_filename
-        if Path(file).parent != _HERE:
-            places.append((file, trace.tb_lineno))
-        trace = trace.tb_next
-    return places
+        what = raised(cause, type(element))
+        return f"Element {self.index} ({element.kind}) gave no force at tick {tick}: {what}.{hint}"
 
 
 def _number(force: Any) -> float:

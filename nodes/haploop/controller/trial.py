@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from haploop.controller.active_elements import make_element
-from haploop.controller.dissipation.element import ASKABLE, Element, ElementError, Motion
+from haploop.controller.dissipation.element import ASKABLE, Element, ElementError, Motion, place_in, raised
 from haploop.controller.dissipation.registry import PluginError, load_source
 from haploop.protocol.quantity import MEANT
 from haploop.protocol.scene.scene import ElementTable
@@ -109,10 +109,11 @@ def _make(elements: list[tuple[str, dict[str, float]]], kinds: dict[str, type[El
                 force = element.force(motion) if memory is None else element.force(motion, memory)[0]
                 finite = math.isfinite(force)
             except Exception as error:
-                what = f"{type(error).__name__}: {error}"
+                what = raised(error, type(element))
                 raise ElementError(f"The element {kind} gave no force when it was tried at rest: {what}.") from error
             if not finite:
-                raise ElementError(f"The element {kind} gave {force}, no finite force, when it was tried at rest.")
+                what = f"{force}, no finite force, when it was tried at rest{place_in(type(element))}"
+                raise ElementError(f"The element {kind} gave {what}.")
     return {"made": len(elements)}
 
 

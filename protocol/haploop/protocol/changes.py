@@ -112,10 +112,10 @@ class Change:
             other, plugin=None, refused=None
         )
 
-    def refuse(self, error: BaseException) -> Change:
-        """Returns the change as one that could not be carried out."""
-        sentence = f"The change at tick {self.tick}, {self.describe()}, was refused: {type(error).__name__}: {error}"
-        return replace(self, refused=sentence)
+    def refuse(self, error: BaseException, place: str = "") -> Change:
+        """Returns the change as one that could not be carried out, ``place`` being where in a file the error rose."""
+        why = f"{type(error).__name__}: {error}{place}"
+        return replace(self, refused=f"The change at tick {self.tick}, {self.describe()}, was refused: {why}")
 
 
 @dataclass(frozen=True)

@@ -126,10 +126,11 @@ def whole_count(seconds: float, rate: int, name: str, units: str, complaints: li
     count = seconds * rate
     nearest = round(count)
     if abs(count - nearest) > _WHOLE_WITHIN * max(1.0, abs(count) * 1e-6):
-        low, high = math.floor(count) / rate, math.ceil(count) / rate
+        legal = [n / rate for n in (math.floor(count), math.ceil(count)) if n or name != "duration"]
+        named = " and ".join(f"{value:.9g} s" for value in legal)
         complaints.append(
             f"{name} must be a whole number of {units} at {rate} Hz, but {seconds:g} s is {count:.6g} of them; "
-            f"the nearest legal values are {low:.9g} s and {high:.9g} s."
+            + (f"the nearest legal values are {named}." if len(legal) > 1 else f"the least legal value is {named}.")
         )
     return nearest
 

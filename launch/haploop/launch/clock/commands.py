@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.dissipation import ElementError, PluginError
 from haploop.launch.clock import device_time
+from haploop.launch.clock.arguments import check_burden, check_names
 from haploop.launch.clock.capabilities import capabilities
 from haploop.launch.clock.clock import Clock, ClockError
 from haploop.launch.clock.pace import PaceError, pace_of
@@ -16,7 +16,6 @@ from haploop.launch.clock.plugin_swap import swap_plugin
 from haploop.launch.clock.roster import Roster
 from haploop.launch.clock.seen import when_seen
 from haploop.launch.scene.mistakes import SceneError
-from haploop.launch.scene.number import is_exotic
 from haploop.launch.spec import OutputError
 from haploop.protocol.changes import Event, describe
 from haploop.protocol.scene.paths import value_at
@@ -28,12 +27,16 @@ if TYPE_CHECKING:
     from haploop.launch.spec import RunSpec
 
 Done = tuple[str, Message]
+# What a run knows of kinds and their files, by the name of the field of ``RunSpec``.
+Code = dict[str, dict[str, Any]]
 Answer = tuple[bool, str, Message]
-# What one command may carry, so that none holds time up: keys and values, tables in each other, letters of a text.
-_MOST_VALUES, _DEEPEST, _LONGEST = 64, 3, 200
 _MOST_TOLD = 5
 _CHANGES = ("swap", "set", "undo")
-_UNITS = "Hz, J, N, Pa, W, g, m, min, rad, s and %, with n, u, m, c, k or M before them"
+_PROBATION = {
+    "restore": "If it raises within its first second, what was there before comes back; the terminal of the run tells "
+    "it at once, the log and the summary keep it, with the file and the line. If it raises later, the run ends.",
+    "end": "If it raises, the run ends, and tells the file and the line.",
+}
 
 
 def in_words(pace: float) -> float | str:
@@ -51,8 +54,8 @@ class Commands:
         self._clock, self._spec, self._roster = clock, spec, roster
         self._rate = spec.scene.clock.control_rate
         self._is_trying = False
-        # Of each change: its event, and the change that would take it back, None where none can.
-        self._undo_by: list[tuple[Event, Event | None]] = []
+        # Of each change: its event, the change that would take it back, None where none can, and the code before it.
+        self._undo_by: list[tuple[Event, Event | None, Code | None]] = []
         self._verbs = {
             "status": self._status,
             "options": self._options,
@@ -74,8 +77,8 @@ class Commands:
         if act is None:
             return False, f"{verb[:40]!r} is no command; these are: {', '.join(self._verbs)}.", {}
         try:
-            _check_names(verb, act, arguments)
-            _check_burden(arguments)
+            check_names(verb, act, arguments)
+            check_burden(arguments)
             done = act(**arguments)
         except Exception as error:
             return _refusal(verb, error)
@@ -169,34 +172,55 @@ class Commands:
             says = f"Only kinds from files that the run was started with by --plugin can be reloaded ({known})"
             raise ClockError(f"{says}, but {kind} was asked for.")
         before = self._clock.scene_at(self._clock.tick_at(at)).dissipation
-        return self._swapped(change, before, self._clock.change(change, at))
+        done = self._swapped(change, before, self._clock.change(change, at))
+        is_known = kind == NO_ELEMENT or self._spec.kinds[kind].__module__.startswith("haploop.")
+        return done if is_known else self._on_probation(done)
 
     def _swap_tried(self, change: Event, at: float | None, reload: bool) -> Generator[None, None, Done]:
         if self._is_trying:
             raise ClockError("The file of another swap is being tried; wait for its answer, then ask again.")
-        self._is_trying = True
+        self._is_trying, code = True, self._code()
         try:
             tick, before = yield from swap_plugin(self._clock, self._spec, change, at, reload)
         finally:
             self._is_trying = False
-        if reload:  # the code before is gone from here: no swap brings it back
-            self._undo_by.append((self._clock.newest, None))
-            return f"element {change['element']} becomes {change['swap']['kind']} at {self._at(tick)}", {"tick": tick}
-        return self._swapped(change, before, tick)
+        return (yield from self._on_probation(self._swapped(change, before, tick, code if reload else None)))
 
-    def _swapped(self, change: Event, before: Sequence[ElementTable], tick: int) -> Done:
-        """Tells what was done, and what would undo it."""
+    def _code(self) -> Code:
+        spec = self._spec
+        return {
+            "kinds": {**spec.kinds}, "plugin_sources": {**spec.plugin_sources}, "plugin_files": {**spec.plugin_files},
+        }  # fmt: skip
+
+    def _take_code(self, code: Code) -> None:
+        for name, known in code.items():
+            there = getattr(self._spec, name)  # the clock has the same
+            there.clear()
+            there.update(known)
+
+    def _on_probation(self, done: Done) -> Generator[None, None, Done]:
+        """Returns the answer to a swap to an element that may raise, once it has been at work for a tick."""
+        asked = self._undo_by[-1][0]
+        try:
+            text, data = yield from when_seen(self._clock, self._roster, *done, by="controller")
+        except ClockError:  # it was refused, and nothing has changed
+            self._undo_by = [each for each in self._undo_by if each[0] is not asked]
+            raise
+        return f"{text}\n{_PROBATION[self._spec.scene.run.faulty_swap]}", data
+
+    def _swapped(self, change: Event, before: Sequence[ElementTable], tick: int, code: Code | None = None) -> Done:
+        """Tells what was done, and what would undo it; ``code`` is that before a reload, which undo brings back."""
         swap, element = change["swap"], change["element"]
         text, data = f"element {element} becomes {swap['kind']} at {self._at(tick)}", {"tick": tick}
         if swap["kind"] == NO_ELEMENT and element < len(before) - 1:  # those after it move up: no swap brings it back
-            self._undo_by.append((self._clock.newest, None))
+            self._undo_by.append((self._clock.newest, None, None))
             return text, data
         back = before[element].as_dict() if element < len(before) else {"kind": NO_ELEMENT}
         words = " ".join([back["kind"], *(f"{key}={value}" for key, value in back.items() if key != "kind")])
         where = f" --element {element}" if element else ""
         undo: Event = {"swap": back, "element": element}
-        self._undo_by.append((self._clock.newest, undo))
-        return f"{text}; to go back: swap {words}{where}", data | {"before": undo}
+        self._undo_by.append((self._clock.newest, undo, code))
+        return f"{text}; to go back: {'undo' if code else f'swap {words}{where}'}", data | {"before": undo}
 
     def _set(self, set: dict[str, float], at: float | None = None) -> tuple[str, Message]:
         before = self._clock.scene_at(self._clock.tick_at(at))
@@ -204,7 +228,7 @@ class Commands:
         what = ", ".join(f"{key} = {value}" for key, value in set.items())
         back = {key: value_at(before, key) for key in set}
         words = " ".join(f"{key}={value}" for key, value in back.items())
-        self._undo_by.append((self._clock.newest, {"set": back}))
+        self._undo_by.append((self._clock.newest, {"set": back}, None))
         return f"{what} from {self._at(tick)} on; to go back: set {words}", {"tick": tick, "before": {"set": back}}
 
     def _undo(self) -> tuple[str, Message]:
@@ -214,17 +238,34 @@ class Commands:
         """
         if not self._undo_by:
             raise ClockError("There is nothing to undo: no swap and no set that a command asked for is left.")
-        asked, back = self._undo_by[-1]
-        if back is None:
-            raise ClockError("The last change cannot be undone: no swap brings back what was there before it.")
+        asked, back, code = self._undo_by[-1]
         what = describe(asked)
+        if back is None:
+            raise ClockError(
+                f"The last change, {what}, cannot be undone: the elements after it have moved up, and no swap puts one "
+                "between others. What was changed before it cannot be undone past it; swap and set still can change it."
+            )
         if self._clock.withdraw(asked):
+            if code:
+                self._take_code(code)
             text, data = f"{what} will not happen", {}
         else:
-            tick = self._clock.change(back)
+            tick = self._change_back(back, code)
             text, data = f"{what} is undone: {describe(back)} at {self._at(tick)}", {"tick": tick, **back}
         self._undo_by.pop()
         return text, data
+
+    def _change_back(self, back: Event, code: Code | None) -> int:
+        """Schedules what undoes a change, with the file that its element had before a reload; returns the tick."""
+        if code is None:
+            return self._clock.change(back)
+        now, file = self._code(), code["plugin_files"].get(back["swap"]["kind"])
+        self._take_code(code)
+        try:
+            return self._clock.change(back, **({"plugin": str(file.resolve())} if file else {}))
+        except Exception:
+            self._take_code(now)
+            raise
 
 
 def _refusal(verb: str, error: Exception) -> Answer:
@@ -236,34 +277,3 @@ def _refusal(verb: str, error: Exception) -> Answer:
     if isinstance(error, ClockError | PaceError | PluginError | ElementError | OutputError):
         return False, str(error), {}
     return False, f"The arguments of {verb} cannot be used: {type(error).__name__}: {error}.", {}
-
-
-def _check_names(verb: str, act: Callable[..., Any], arguments: Message) -> None:
-    """Raises ClockError where an argument is none of the command's, or one that it needs is missing."""
-    taken = signature(act).parameters
-    needed = [name for name, one in taken.items() if one.default is one.empty and name not in arguments]
-    if needed or not arguments.keys() <= taken.keys():
-        names = f"it takes {', '.join(taken)}" if taken else "it takes none"
-        lacks = f", and {' and '.join(needed)} must be given" if needed else ""
-        raise ClockError(f"The arguments of {verb} cannot be used: {names}{lacks}.")
-
-
-def _check_burden(arguments: Message) -> None:
-    """Raises ClockError where a command carries more than takes a moment to look through, or keys that are none."""
-    left: list[tuple[Any, int]] = [(arguments, 0)]
-    seen = 0
-    while left:
-        value, depth = left.pop()
-        inner = [*value, *value.values()] if isinstance(value, dict) else value if isinstance(value, list) else []
-        seen += len(inner)
-        if seen > _MOST_VALUES or depth > _DEEPEST:
-            raise ClockError(
-                f"A command carries at most {_MOST_VALUES} keys and values, {_DEEPEST} tables deep; this one has more."
-            )
-        if isinstance(value, str | bytes) and len(value) > _LONGEST:
-            raise ClockError(f"A text in a command has at most {_LONGEST} letters, but one has {len(value)}.")
-        if isinstance(value, str) and is_exotic(value):
-            raise ClockError(f"{value!r} has a unit that a running loop does not know; it knows {_UNITS}.")
-        if isinstance(value, dict) and (odd := [key for key in value if not isinstance(key, str)]):
-            raise ClockError(f"The keys of what a command carries are texts, but {odd[0]!r} was given as one.")
-        left += [(one, depth + 1) for one in inner]

@@ -1,4 +1,4 @@
-"""The answer to a change that a program of somebody else's is asked for: given when it has been seen, or refused."""
+"""The answer to a change that somebody else's program or element is asked for: given when it is seen, or refused."""
 
 from __future__ import annotations
 
@@ -12,25 +12,31 @@ from haploop.protocol.transport.wire import Message
 
 # Of the 5 s for which a terminal waits for its answer.
 _PATIENCE_S = 3.0
-_NOT_YET = "; not all of this loop is haploop's own, and whether it carries this out is seen when the tick is done"
+_NOT_YET = {
+    "logger": "; not all of this loop is haploop's own, and whether it carries this out is seen when the tick is done",
+    "controller": "; it is tried on the motion of that tick when time gets there",
+}
 
 
 def when_seen(
-    clock: Clock, roster: Callable[[], Roster], text: str, data: Message
+    clock: Clock, roster: Callable[[], Roster], text: str, data: Message, by: str = "logger"
 ) -> Generator[None, None, tuple[str, Message]]:
-    """Returns a command's answer once its change has been seen in telemetry.
+    """Returns a command's answer once its change has been seen in telemetry, or carried out by the controller.
 
     It yields while time goes on, and says so in the answer where time does not get there soon.
+
+    Args:
+        by: whose tick tells: ``logger`` or ``controller``.
 
     Raises ClockError where the change was refused.
     """
     tick, give_up = data["tick"], time.monotonic() + _PATIENCE_S
     while tick <= clock.until and not clock.paused and time.monotonic() < give_up:
-        logger = roster().own("logger")
-        if logger is None or logger.tick > tick or logger.done:
+        node = roster().own(by)
+        if node is None or node.tick > tick or node.done:
             break
         yield
     if refused := next((c.refused for c in changes_of(clock.events) if c.tick == tick and c.refused), None):
         raise ClockError(refused)
-    logger = roster().own("logger")
-    return text + ("" if logger and logger.tick > tick else _NOT_YET), data
+    node = roster().own(by)
+    return text + ("" if node and node.tick > tick else _NOT_YET[by]), data

@@ -35,6 +35,9 @@ class ClockServer:
     Args:
         welcome: of the fields of WELCOME run, scene, timebase and context.
         start_gate: given the pids of all that are ready, returns whether the first tick may be worked on.
+
+    Attributes:
+        untold: sentences of changes refused or taken back, which whoever leads the run shows and takes out.
     """
 
     def __init__(
@@ -55,6 +58,7 @@ class ClockServer:
         self.roster = Roster(programs)
         self.results: dict[str, Message] = {}
         self.unknown_peers = 0
+        self.untold: list[str] = []
         self._sender = b""  # of a message of which frames are still to be taken
         self._greeted, self._start_gate = False, start_gate
         self._granted, self._last_sent = -1, False
@@ -226,6 +230,7 @@ class ClockServer:
         elif node.is_own:
             for refusal in refusals_of(status, self._clock.events):
                 self._clock.note(refusal)
+                self.untold.append(str(refusal.get("refused") or refusal.get("restored")))
             if node.role == self.roster.witness:
                 self._clock.settle(node.tick)
 

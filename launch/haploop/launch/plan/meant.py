@@ -15,10 +15,11 @@ from haploop.protocol.walls.registry import make_wall
 _USUAL = (
     ("clock.round_trip_delay", 0.0, 1.0, "s"),
     ("wall.stiffness", 1.0, 1e6, "N/m"),
-    ("device.mass", 1e-4, 100.0, "kg"),
+    ("device.mass", 1e-4, 10.0, "kg"),
     ("encoder.resolution", 1e-10, 1e-3, "m"),
 )
 _MANY_TICKS, _DEEP_M = 1000, 1e-3
+_LONG_TICKS = 10_000_000
 Found = Mapping[str, float]
 
 
@@ -33,6 +34,17 @@ def _late(scene: Scene) -> Found | None:
     delay_s = scene.clock.round_trip_delay
     ticks = delay_s * scene.clock.control_rate
     return {"ticks": ticks, "delay_s": delay_s} if ticks >= _MANY_TICKS and delay_s <= 1.0 else None
+
+
+def _long(scene: Scene) -> Found | None:
+    ticks = scene.duration * scene.clock.control_rate
+    return {"ticks": ticks, "duration_s": scene.duration} if ticks > _LONG_TICKS else None
+
+
+def _no_contact(scene: Scene) -> Found | None:
+    """Tells whether elements wait for a contact that cannot come."""
+    waiting = [element for element in scene.dissipation if element.acts != "always"]
+    return {} if waiting and scene.wall is None and not hand_is_unmodelled(scene) else None
 
 
 def _never_answers(scene: Scene) -> Found | None:
@@ -76,7 +88,8 @@ def _out_of_reach(scene: Scene) -> Found | None:
         if ratio and abs(begin - hand.rest) + swing < reach_m:
             begin, reach_m = hand.rest, swing
     way_m = abs(wall.position - begin) - _count_m(scene)
-    return {"way_mm": way_m * 1e3, "reach_mm": reach_m * 1e3} if way_m > reach_m else None
+    is_told = _beyond_the_end(scene) is not None
+    return {"way_mm": way_m * 1e3, "reach_mm": reach_m * 1e3} if way_m > reach_m and not is_told else None
 
 
 def _beyond_the_end(scene: Scene) -> Found | None:
@@ -100,6 +113,16 @@ def _begins_deep(scene: Scene) -> Found | None:
 RULES = (
     Rule(_late, "The delay, {delay_s:g} s, is {ticks:.0f} ticks; is that the unit that was meant?"),
     Rule(
+        _long,
+        "The run has {ticks:.3g} ticks, {duration_s:.6g} s, and its log holds them all; is that the unit that was "
+        "meant?",
+    ),
+    Rule(
+        _no_contact,
+        "Nothing is ever in contact, since there is no [wall]: elements of [[dissipation]] give no force unless they "
+        'say acts = "always".',
+    ),
+    Rule(
         _never_answers,
         "No force takes effect within the run, since clock.round_trip_delay is no shorter than duration.",
     ),
@@ -115,7 +138,7 @@ RULES = (
     ),
     Rule(
         _out_of_reach,
-        "The wall is never reached: it is {way_mm:.3g} mm away, and the hand's force and the speed at the start "
+        "The wall is never reached: it is {way_mm:.4g} mm away, and the hand's force and the speed at the start "
         "move the device by less than {reach_mm:.3g} mm.",
     ),
     Rule(

@@ -10,7 +10,7 @@ PRINTS = "prints.txt"
 _LOOK_S = 0.1
 # Lines shown at once, and in each second after that.
 _AT_ONCE, _EACH_SECOND = 20, 1.0
-_MOST_BYTES, _LONGEST = 65_536, 200
+_MOST_BYTES, _LONGEST, _LONGEST_OF_OWN = 65_536, 200, 1000
 
 
 class ShownPrints:
@@ -22,6 +22,7 @@ class ShownPrints:
         self._due = self._counted = 0.0
         self._budget: float = _AT_ONCE
         self._said = False
+        self._told = 0
 
     def look(self, now: float) -> None:
         """Shows what is new, given the wall time in s; cheap, and no oftener than every 0.1 s."""
@@ -35,6 +36,13 @@ class ShownPrints:
         self._show(shown)
         if len(shown) < len(lines) or not is_all:
             self._skip()
+
+    def tell(self, sentences: list[str]) -> None:
+        """Shows what the run itself has to tell, whole, and takes it out of the list; at most some 20 a run."""
+        self._told += len(sentences)
+        if self._told <= _AT_ONCE:
+            self._show(sentences, longest=_LONGEST_OF_OWN)
+        sentences.clear()
 
     def close(self, failed: bool) -> None:
         """Shows the last lines of a run that failed, of any other what is left to show; removes an empty file."""
@@ -70,8 +78,8 @@ class ShownPrints:
             self._said = True
             self._show([f"More was printed than is shown here; all of it stands in {self._file}."])
 
-    def _show(self, lines: list[str]) -> None:
+    def _show(self, lines: list[str], longest: int = _LONGEST) -> None:
         with contextlib.suppress(OSError, ValueError):  # a terminal that is gone ends no run
             for line in lines:
                 text = line if line.isprintable() else "".join(c if c.isprintable() else "?" for c in line)
-                print(text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ...", file=sys.stderr)
+                print(text if len(text) <= longest else f"{text[:longest]} ...", file=sys.stderr)

@@ -186,6 +186,7 @@ class Supervisor:
                     poller.unregister(child.died)
             self._deadlines.check()
             self._prints.look(self._machine.now())
+            self._prints.tell(self._server.untold)
             if logger := self._server.roster.own("logger"):
                 self._spec.on_progress(logger.status)
             if self._server.results:

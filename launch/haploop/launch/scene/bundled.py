@@ -25,8 +25,11 @@ def bundled(folder: str) -> dict[str, Path]:
 
 
 def of_name(name: str, folder: str) -> Path | None:
-    """Returns the bundled file of a name, which may have its suffix and its folder (``devices/premium15.toml``)."""
-    first, _, rest = name.removesuffix(".toml").partition("/")
+    """Returns the bundled file of a name, which may have its suffix and its folder, as in a checkout, too.
+
+    ``premium15``, ``devices/premium15.toml`` and ``launch/devices/premium15.toml`` are the same.
+    """
+    first, _, rest = name.removeprefix("launch/").removesuffix(".toml").partition("/")
     return bundled(first).get(rest) if rest and first in FOLDERS else bundled(folder).get(name.removesuffix(".toml"))
 
 

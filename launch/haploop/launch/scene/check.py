@@ -157,7 +157,7 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
             where = f"[{'.'.join(map(str, table))}]" if table else f"a {schema['title'].lower()}"
             layers.complain(key, f"Allowed: {', '.join(keys)}.", f"is not a key of {where}", nearest(name, keys))
         case "missing":
-            layers.complain(key, f"It must be {_form(rule)}.", "is missing")
+            layers.complain(key, f"It must be {_form(rule)}.{_of_a_device(layers, key)}", "is missing")
         case "union_tag_not_found":
             allowed = alternatives(schema, rule)
             layers.complain((*key, "kind"), f"Allowed: {', '.join(allowed)}.", "is missing")
@@ -168,8 +168,21 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
         case "sentence":
             given = "does not fit together" if isinstance(layers.value(key), dict) else None
             layers.complain(key, message, given)
+        case "list_type" if isinstance(layers.value(key), dict):
+            layers.complain(key, f"Tables of a list have two pairs of brackets: [[{key[-1]}]].", "is one table")
         case _:
             layers.complain(key, _FORMS.get(what, f"{message}."))
+
+
+def _of_a_device(layers: Layers, key: KeyPath) -> str:
+    """Returns what to do with a file that describes a device and no task; nothing for another."""
+    if key != ("duration",) or not layers.data.keys().isdisjoint({"wall", "hand", "dissipation"}):
+        return ""
+    name = layers.path.name
+    return (
+        f" A file with a device alone is no scene: haploop advise {name} takes it as it is, and a scene takes it in by "
+        f'extends = ["{name}"].'
+    )
 
 
 def _form(rule: Schema) -> str:

@@ -105,6 +105,8 @@ def from_text(text: str, target: str) -> Decimal:
     Raises ValueError with a full sentence that says why it is none.
     """
     match = _TEXT.fullmatch(text)
+    if not match and re.match(r"\s*[+-]?\d+,\d", text):
+        raise ValueError(f'A decimal has a point and no comma: "{text.replace(",", ".", 1)}".')
     if not match:
         raise ValueError(f'It must be a number and its unit, such as "1 {target or "%"}".')
     amount, before, unit, after = match[1], Decimal(match[2] or 1), match[3] or "", Decimal(match[4] or 1)

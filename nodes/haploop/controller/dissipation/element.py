@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, dataclass_transform, get_args, get_origin, get_type_hints
 
@@ -13,6 +14,34 @@ from haploop.protocol.quantity import Quantity
 
 class ElementError(Exception):
     """An element that cannot be made of its parameters, or gave no force; the message names it and what it raised."""
+
+
+_HERE = Path(__file__).parent
+_NO_PLUGIN = (_HERE.parent, _HERE / "registry.py")
+
+
+def places_of(error: BaseException | None) -> list[tuple[str, int]]:
+    """Returns the files and lines of elements through which an error came, the innermost last; none of this package."""
+    places, trace = [], error.__traceback__ if error else None
+    while trace:
+        file = trace.tb_frame.f_code.co_filename
+        if not (file.startswith("<") or {Path(file), Path(file).parent} & {*_NO_PLUGIN}):
+            places.append((file, trace.tb_lineno))
+        trace = trace.tb_next
+    return places
+
+
+def place_in(kind: type[Element] | None, error: BaseException | None = None) -> str:
+    """Returns `` (file, line n)``: where in an element's file an error rose, or else where its ``force`` begins."""
+    code = getattr(getattr(kind, "force", None), "__code__", None)
+    places = places_of(error) or ([(code.co_filename, code.co_firstlineno)] if code else [])
+    lines = [line for file, line in places if file == places[0][0]]
+    return f" ({Path(places[0][0]).name}, line {lines[-1]})" if lines else ""
+
+
+def raised(error: BaseException | None, kind: type[Element] | None = None) -> str:
+    """Returns what an element raised, with the file and the line of its code."""
+    return f"{type(error).__name__}: {error}{place_in(kind, error)}"
 
 
 # What an element may ask for beside the motion, which it is told then.

@@ -12,7 +12,7 @@ from pkgutil import resolve_name
 from types import ModuleType
 from typing import Any
 
-from haploop.controller.dissipation.element import ASKABLE, Element
+from haploop.controller.dissipation.element import ASKABLE, Element, places_of
 from haploop.protocol.files import read_text
 from haploop.protocol.installed import entry_points_of
 from haploop.protocol.quantity import Quantity
@@ -85,7 +85,10 @@ def load_source(source: str, origin: str) -> dict[str, type[Element]]:
         with redirect_stdout(sys.stderr):
             exec(compile(source, origin, "exec"), module.__dict__)
     except (Exception, SystemExit) as error:
-        line = f", line {error.lineno}" if isinstance(error, SyntaxError) and error.lineno else ""
+        lines = [line for file, line in places_of(error) if file == origin]
+        if isinstance(error, SyntaxError) and error.filename == origin and error.lineno:
+            lines = [error.lineno]
+        line = f", line {lines[-1]}" if lines else ""
         raise PluginError(f"The plugin {origin}{line} does not load: {type(error).__name__}: {error}") from error
     found = [c for c in vars(module).values() if inspect.isclass(c) and c.__module__ == module.__name__]
     elements = [checked(c, origin) for c in found if issubclass(c, Element)]

@@ -54,18 +54,18 @@ def check(
         if scene is None:
             raise typer.BadParameter("A scene file was expected, or --schema.")
         resolved = load(scene, set or [], kinds, any_hand=True)
-    noted = print_notes(resolved, kinds)
     if json:
-        print_json({**resolved.as_dict(), "notes": noted})
+        print_json({**resolved.as_dict(), "notes": print_notes(resolved, kinds)})
     else:
         tables = resolved.as_dict()
         force = tables.get("hand", {}).get("force", {})
         if sys.stdout.isatty() and len(force.get("time", ())) > _MOST_PRINTED:  # into a file goes all of it
             for name in ("time", "force"):
                 force[name] = f"{len(force[name])} numbers from {min(force[name]):g} to {max(force[name]):g}"
-        print(to_toml(tables), end="")
+        print(to_toml(tables), end="", flush=True)
         with_a = " with a plant of yours (--node plant=COMMAND)" if hand_is_unmodelled(resolved) else ""
         print(f"{scene} can be run{with_a}.", file=sys.stderr)
+        print_notes(resolved, kinds)
 
 
 def plugins(plugin: Plugin = None, json: Json = False) -> None:

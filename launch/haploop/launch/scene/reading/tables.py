@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -51,10 +52,22 @@ def parse(
     except UnicodeDecodeError as error:
         problem = f"A {what} must be UTF-8 text, but byte {error.start} is not."
     except ValueError as error:
-        problem = f"This is not TOML: {error}."
+        problem = f"This is not TOML: {error}.{_hint(str(error), text)}"
     except RecursionError:
         problem = _TOO_DEEP
     raise SceneError([Mistake(shown(path), "", "", problem)])
+
+
+def _hint(problem: str, text: str) -> str:
+    """Returns how to write a value that TOML has no form for: a decimal comma, or a unit without quotes."""
+    line = re.search(r"at line (\d+)", problem)
+    written = text.splitlines()[int(line[1]) - 1] if line else ""
+    value = written.partition("=")[2].partition("#")[0].strip()
+    if re.fullmatch(r"[+-]?\d+,\d+", value):
+        return f" A decimal has a point and no comma: {value.replace(',', '.')}."
+    if re.fullmatch(r"[+-]?\d[\d.,]*\s*[^\W\d][\w */^.]*", value):
+        return f' A number with its unit is text, in quotes: "{value.replace(",", ".")}".'
+    return ""
 
 
 def _with_the_first(path: Path, text: str, doubled: list[Mistake]) -> Tables | None:
@@ -70,9 +83,8 @@ def _with_the_first(path: Path, text: str, doubled: list[Mistake]) -> Tables | N
 
 
 def _absent(path: Path, what: str) -> str:
-    """Returns the sentence on a file that is not there; a name without folder may have been meant for a bundled one."""
-    names = bundled(f"{what}s")
-    meant = nearest(path.stem, names) if path.name == str(path) else None
+    """Returns the sentence on a file that is not there; its name may have been meant for a bundled one."""
+    meant = nearest(path.stem, bundled(f"{what}s"))
     hint = f", and no {what} of that name comes with haploop" if path.name == str(path) else ""
     return f"There is no such file{hint}{f'; did you mean {meant}?' if meant else '.'}"
 
