@@ -177,12 +177,14 @@ def _each(
 
 
 def _as_rows(data: Sequence[dict[str, Any]]) -> tuple[Row, ...]:
-    """Returns the rows that ``asdict`` and JSON made lists of."""
-    tuples = ("values", "at_edge", "parameter", "device")
-    return tuple(
-        Row(**each | {name: tuple(each[name]) for name in tuples} | {"seeds": tuple(map(_as_trying, each["seeds"]))})
-        for each in data
-    )
+    return tuple(map(_as_row, data))
+
+
+def _as_row(data: dict[str, Any]) -> Row:
+    """Returns the row that ``asdict`` and JSON made lists of."""
+    read: dict[str, Any] = {name: tuple(data[name]) for name in ("values", "at_edge", "parameter", "device")}
+    read["seeds"] = tuple(map(_as_trying, data["seeds"]))
+    return Row(**data | read)
 
 
 def _as_trying(data: Sequence[Any]) -> Trying:
