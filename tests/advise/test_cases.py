@@ -75,3 +75,10 @@ def test_the_grip_is_scaled_with_the_hand_and_the_motor_with_the_device():
     heavy = scale_quantities(cable, {"device mass": 1.2, "hand stiffness": 0.8})
     assert value_at(heavy, "transmission.motor_mass") == pytest.approx(1.2 * 0.0029)
     assert value_at(heavy, "hand.grip.stiffness") == pytest.approx(0.8 * 552.4)
+
+
+def test_an_assumed_delay_is_taken_once_and_an_assumed_start_not_at_all_since_every_case_has_its_own():
+    assert [each.key for each in assumptions(SCENES / "demo.toml")] == ["clock.round_trip_delay"]
+    of = ranges(loop_of("premium15", "clock.round_trip_delay=0.002"), ["clock.round_trip_delay"])
+    assert of["clock.round_trip_delay"] == (0.5, 2.0)
+    assert "delay" not in of

@@ -50,6 +50,7 @@ _MARK = "ASSUMPTION"
 _TABLE = re.compile(r"\[+\s*([\w.]+)\s*\]+")
 _VALUE = re.compile(r"([\w]+)\s*=\s*[^#]*#\s*(.*)")
 # What decides how stiff a wall may be; the hand is tried in its own corners.
+_STARTS = ("device.position", "device.velocity")
 _TABLES = ("device", "friction", "encoder", "transmission", "clock")
 
 
@@ -144,6 +145,8 @@ def _by_key(path: Path) -> dict[str, Assumed]:
             table = match[1]
         elif (match := _VALUE.match(line)) and table.split(".")[0] in _TABLES:
             key, comment = f"{table}.{match[1]}", match[2]
+            if key in _STARTS:
+                continue
             words = comment.partition(f"{_MARK}: ")[2] if _MARK in comment else ""
             known[key] = Assumed(key, words)
     return known

@@ -131,7 +131,8 @@ def ranges(loop: Scene, assumed: Sequence[str] = ()) -> dict[str, tuple[float, f
 
     Only what is there and not 0; a quantity all of whose keys are assumed is none of its own.
     """
-    found = {DELAY: TOLERANCE} if loop.clock.round_trip_delay else {}
+    is_late = loop.clock.round_trip_delay and "clock.round_trip_delay" not in assumed
+    found = {DELAY: TOLERANCE} if is_late else {}
     for name in _KEYS:
         if any(value_at(loop, key) for key in _keys_of(name) if key not in assumed):
             found[name] = TOLERANCE
