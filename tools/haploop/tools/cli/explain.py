@@ -154,18 +154,24 @@ def _terms(scene: Scene, planned: Plan) -> Table:
     return make_facts(facts.items())
 
 
-def _limits(scene: Scene, limits: list[Limit]) -> Table:
+def _limits(scene: Scene, limits: list[Limit]) -> RenderableType:
+    """Makes a table of the limits that speak of the loop, and a sentence for each reason why others do not."""
+    from rich.console import Group
     from rich.text import Text
 
-    table = make_table("limit of K by", "for", "K", "the wall here, or why none", numbers=("K",), unbroken=("for",))
+    table = make_table("limit of K by", "for", "K", "the wall here", numbers=("K",), unbroken=("for",))
+    silent: dict[str, list[str]] = {}
     for limit in limits:
         if limit.stiffness_N_m is None:
-            table.add_row(limit.name, limit.kind, "–", Text(limit.why_not), style="dim")
+            silent.setdefault(limit.why_not, []).append(limit.name)
             continue
         here = scene.wall.stiffness if scene.wall else 0.0
         share = f"{fixed(100.0 * here / limit.stiffness_N_m)} % of it" if here and limit.stiffness_N_m else ""
-        table.add_row(limit.name, limit.kind, spring(limit.stiffness_N_m), share)
-    return table
+        table.add_row(
+            limit.name, limit.kind, spring(limit.stiffness_N_m), Text("; ".join(filter(None, [share, limit.why_not])))
+        )
+    why = [Text(f"No limit by {'; '.join(names)}: {reason}", "dim") for reason, names in silent.items()]
+    return Group(*([table] if table.row_count else []), *why)
 
 
 def _count(scene: Scene, count: OneCount) -> Table:

@@ -13,7 +13,7 @@ from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.walls.registry import make_wall
 from haploop.tools.linear.bounds import bounds_of
-from haploop.tools.linear.linearity import Kinds, why_not_linear
+from haploop.tools.linear.linearity import Kinds, is_linear, why_not_linear
 from haploop.tools.linear.one_tick import NeverStable, NotLinear, OneTickMap
 
 # Counts inside the wall from which one is gone, ticks of rest before it and ticks watched after it.
@@ -26,7 +26,8 @@ class Limit:
 
     Attributes:
         kind: "passivity" with any passive hand, or "stability" with the scene's own.
-        stiffness_N_m: None where it does not speak of the scene, for which ``why_not`` is the reason.
+        stiffness_N_m: None where it does not speak of the scene, for which ``why_not`` is the reason; of that
+            without friction it says so.
     """
 
     name: str
@@ -38,14 +39,24 @@ class Limit:
 def limits_of(scene: Scene, kinds: Kinds) -> list[Limit]:
     """Returns all known bounds, then where the map M of one tick stops being stable, rho(M) = 1, from a soft wall on.
 
-    Where there are elements, the last is that of the wall alone.
+    Where there are elements, the last is that of the wall alone. Of a loop that friction alone keeps from being linear
+    it is also that of the same loop without friction.
     """
     found = [Limit(bound.name, bound.kind, bound.stiffness_N_m, bound.why_not) for bound in bounds_of(scene, kinds)]
-    found.append(_exact("rho(M) = 1", scene, kinds))
+    found += _smoothed("rho(M) = 1", scene, kinds)
     # A spring asks for no velocity, so that what estimates it is out of the loop, too.
     is_spring = scene.wall is None or not scene.wall.kind
     alone = replace(scene, dissipation=(), **{"velocity": None, "acceleration": None} if is_spring else {})
-    return [*found, *([_exact("rho(M) = 1, wall alone", alone, kinds)] if scene.dissipation else [])]
+    return [*found, *(_smoothed("rho(M) = 1, wall alone", alone, kinds) if scene.dissipation else [])]
+
+
+def _smoothed(name: str, scene: Scene, kinds: Kinds) -> list[Limit]:
+    """Returns the exact limit of a loop, and that without friction where only this has one."""
+    of_all, smooth = _exact(name, scene, kinds), replace(scene, friction=None)
+    if not scene.friction or not is_linear(smooth, kinds):
+        return [of_all]
+    of_smooth = _exact(f"{name}, smooth", smooth, kinds)
+    return [of_all, of_smooth if of_smooth.why_not else replace(of_smooth, why_not="of the loop without [friction]")]
 
 
 def _exact(name: str, scene: Scene, kinds: Kinds) -> Limit:
