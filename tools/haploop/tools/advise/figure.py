@@ -81,7 +81,7 @@ def _changes(ax: Axes, told: Advice, others: list[tuple[str, float, str]]) -> No
     for row, (_, stiffness, words) in enumerate(others):
         colour = style.VERDICTS["steady"] if stiffness > nominal else "#D9B08C"
         ax.barh(row, stiffness / 1e3, _BAR, color=colour)
-        _beside(ax, stiffness, row, words)
+        _beside(ax, max(stiffness, nominal), row, words)  # no word on the line of the described device
     if nominal:
         ax.axvline(nominal / 1e3, color=style.INK, linewidth=1.2)
     title = "the same wall as described, with one change of the device"

@@ -94,6 +94,9 @@ def _energies(ax: Axes, outcome: Outcome, lines: Floats, title: str) -> None:
     if not agree:
         for label, dashes in (("true", "-"), ("sampled", (0, (4, 2)))):
             ax.plot([], [], color=style.GREY, linestyle=dashes, linewidth=1.3, label=label)
+    if outcome.force:
+        look = {"color": style.INK, "linewidth": 1.0, "label": "recorded force", "gid": "force.true"}
+        curves.append((lines[-2], look))
     _curves(ax, outcome, lines[0], curves, title, "energy", "J")
     if not agree:
         style.legend(ax, only=("true", "sampled"), **_CORNER)

@@ -30,8 +30,8 @@ VERDICTS = {
     "undecided": "#555555",
 }
 TEXT, SMALL, LARGE = 9.0, 8.0, 15.0
-# What fits into a legend beside the title, and what the handle of an entry takes of it.
-_ROOM_LETTERS, _HANDLE_LETTERS = 76, 9
+# Letters of a legend that fit above a panel, and what the handle of an entry and a letter of the title take of them.
+_ROOM_LETTERS, _HANDLE_LETTERS, _TITLE_LETTER = 88, 6, 1.25
 
 
 def element_colour(number: int) -> str:
@@ -75,7 +75,8 @@ def legend(ax: Axes, only: tuple[str, ...] = (), **where: Any) -> None:
     """
     named = [(handle, label) for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)]
     named = [(handle, label) for handle, label in named if label in only or not only]
-    while not where and sum(len(label) + _HANDLE_LETTERS for _, label in named) > _ROOM_LETTERS:
+    room = _ROOM_LETTERS - _TITLE_LETTER * len(ax.get_title(loc="left"))
+    while not where and sum(len(label) + _HANDLE_LETTERS for _, label in named) > room:
         named = named[:-1]
     if named:
         handles, labels = zip(*named, strict=True)

@@ -59,7 +59,7 @@ def _view_mm(run: RunData, t: Floats, x_mm: Floats) -> tuple[float, float, str]:
         x_since = x_mm[:, since]
         near = min(np.nanmin(x_since), walls.min()), max(np.nanmax(x_since), walls.max())
         if high - low > _DWARFED * (near[1] - near[0]):
-            note = f" (approach from {x_mm[0, 0]:.3g} mm not shown)"
+            note = " (approach not shown)"
             low, high = near
     margin = 0.08 * (high - low) or 0.01
     return float(low - margin), float(high + margin), note
@@ -93,7 +93,9 @@ def force_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str)
             line(ax, times[here], force[here], span.name, colour, held=True, linewidth=1.0, gid=span.name)
     at_steps = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
     for name, force in run.plant_forces_N.items():
-        line(ax, run.t_s[at_steps], force[at_steps], name, style.OF_THE_PLANT[name], linewidth=1.0, gid=name)
+        # Below the parts that it may equal, and wide enough to be seen beside them.
+        look = {"linewidth": 2.8, "alpha": 0.5, "zorder": 1.9, "gid": name}
+        line(ax, run.t_s[at_steps], force[at_steps], name, style.OF_THE_PLANT[name], **look)
     most = run.scene.actuator and run.scene.actuator.saturation
     if most is not None and np.abs(run.controller["total"][inside]).max(initial=0.0) > most:
         look = {"color": style.OF_THE_PLANT["actuator"], "linewidth": 0.8, "dashes": (1, 2), "zorder": 0}
