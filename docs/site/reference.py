@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
@@ -56,13 +57,14 @@ def scene() -> str:
     schema = json_schema(registry())
     tables = schema["$defs"]
     parts = ["# Scene", GENERATED, _SCENE]
-    parts += ["## At the top", _keys({key: one for key, one in schema["properties"].items() if not _of(one)})]
+    parts += ["## At the top", _keys({key: one for key, one in schema["properties"].items() if not _of(one)}, tables)]
     for key, one in schema["properties"].items():
         for name in _of(one):
-            parts += _table(_heading(key, one, name, len(_of(one)) > 1), tables[name])
+            parts += _table(_heading(key, one, _kind(name, tables), len(_of(one)) > 1), tables[name], tables)
             for inner, its in tables[name].get("properties", {}).items():
                 for kind in _of(its) if key == "hand" else ():
-                    parts += _table(_heading(f"{key}.{inner}", its, kind, len(_of(its)) > 1), tables[kind])
+                    heading = _heading(f"{key}.{inner}", its, _kind(kind, tables), len(_of(its)) > 1)
+                    parts += _table(heading, tables[kind], tables)
     return "\n\n".join(parts) + "\n"
 
 
@@ -79,26 +81,28 @@ def _of(one: Mapping[str, Any]) -> list[str]:
     return [each["$ref"].rpartition("/")[2] for each in one.get("anyOf", [one]) if "$ref" in each]
 
 
-def _heading(key: str, one: Mapping[str, Any], name: str, several: bool) -> str:
+def _heading(key: str, one: Mapping[str, Any], kind: str, several: bool) -> str:
     brackets = f"[[{key}]]" if "items" in one else f"[{key}]"
-    return f"## `{brackets}`" + (f" of kind `{_kind(name)}`" if several else "")
+    return f"## `{brackets}`" + (f" of kind `{kind}`" if several else "")
 
 
-def _kind(name: str) -> str:
-    return "".join(
+def _kind(name: str, tables: Mapping[str, Any]) -> str:
+    """Returns what a scene writes as the kind of a table, or its name in small letters where it has no kind."""
+    told = tables.get(name, {}).get("properties", {}).get("kind", {}).get("const")
+    return told or "".join(
         f"-{letter.lower()}" if letter.isupper() and at else letter.lower() for at, letter in enumerate(name)
     )
 
 
-def _table(heading: str, table: Mapping[str, Any]) -> list[str]:
-    return [heading, _plain(table.get("description", "")), _keys(table.get("properties", {}))]
+def _table(heading: str, table: Mapping[str, Any], tables: Mapping[str, Any]) -> list[str]:
+    return [heading, _plain(table.get("description", "")), _keys(table.get("properties", {}), tables)]
 
 
-def _keys(properties: Mapping[str, Any]) -> str:
+def _keys(properties: Mapping[str, Any], tables: Mapping[str, Any]) -> str:
     rows = []
     for key, one in properties.items():
         if inner := _of(one):
-            about = f"a table; see below ({', '.join(_kind(name) for name in inner)})"
+            about = f"a table; see below ({', '.join(_kind(name, tables) for name in inner)})"
         else:
             about = _plain(one.get("description") or _choices(one))
         default = json.dumps(one["default"]) if one.get("default") is not None else ""
@@ -109,12 +113,14 @@ def _keys(properties: Mapping[str, Any]) -> str:
 def _choices(one: Mapping[str, Any]) -> str:
     given = one.get("enum") or ([one["const"]] if "const" in one else [])
     kinds = one.get("type") or [each.get("type", "") for each in one.get("anyOf", [])]
-    return " or ".join([f'`"{each}"`' for each in given] or ([kinds] if isinstance(kinds, str) else kinds))
+    return " or ".join([f"`{json.dumps(each)}`" for each in given] or ([kinds] if isinstance(kinds, str) else kinds))
 
 
 def _plain(text: str) -> str:
-    """Returns text without what Markdown or HTML would take for its own."""
-    return text.replace("\n", " ").replace("[", "\\[").replace("<", "&lt;").replace("*", "\\*").replace("_", "\\_")
+    """Returns text without what Markdown or HTML would take for its own, code in backticks as it is."""
+    parts = re.split(r"(`+[^`]+`+)", text.replace("\n", " "))
+    marks = str.maketrans({"[": "\\[", "<": "&lt;", "*": "\\*", "_": "\\_"})
+    return "".join(part if part.startswith("`") else part.translate(marks) for part in parts)
 
 
 def commands() -> str:
@@ -177,7 +183,8 @@ def _leaves(entry: Any, key: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _shown(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    """Returns a value as the JSON file has it, a float shortened, text without its quotes."""
+    return f"{value:.4g}" if isinstance(value, float) else value if isinstance(value, str) else json.dumps(value)
 
 
 def log() -> str:

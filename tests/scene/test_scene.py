@@ -92,7 +92,7 @@ def test_what_must_be_there_is_asked_for(key):
     [
         ({"device": 3}, "device is 3. It must be a table."),
         ({"title": 3}, "title is 3. It must be text in quotes."),
-        ({"dissipation": {"kind": "damping"}}, 'dissipation is { kind = "damping" }. It must be a list.'),
+        ({"dissipation": {"kind": "damping"}}, "dissipation is one table. It must be a list of tables: [["),
         ({"dissipation": [{"damping": 1}]}, "dissipation.0.kind is missing. Allowed: "),
         ({"dissipation": [3]}, "dissipation.0 is 3. It must be a table."),
         ({"dissipation": [{"kind": "none"}]}, 'dissipation.0.kind is "none". Allowed: '),

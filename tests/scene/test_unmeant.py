@@ -110,7 +110,7 @@ REPAIRS = {
     "duration = 1,5": "A decimal has a point and no comma: 1.5.",
     "duration = 2 ms": 'A number with its unit is text, in quotes: "2 ms".',
     'duration = "0,3 s"': 'A decimal has a point and no comma: "0.3 s".',
-    "duration = 1.0\n[dissipation]\nkind='damping'": "Tables of a list have two pairs of brackets: [[dissipation]].",
+    "duration = 1.0\n[dissipation]\nkind='damping'": "It must be a list of tables: [[dissipation]], two",
     "": "haploop advise my.toml takes it as it is",
 }
 

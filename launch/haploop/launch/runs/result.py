@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 # What the end of a summary's key says of its unit; the first that fits counts.
-_UNITS = {"_N_m": "N/m", "_m_s": "m/s", "_1_s": "1/s", "_m": "m", "_s": "s", "_N": "N", "_J": "J"}
+_UNITS = {"_Hz": "Hz", "_N_m": "N/m", "_m_s": "m/s", "_1_s": "1/s", "_m": "m", "_s": "s", "_N": "N", "_J": "J"}
 
 
 def unit_of(key: str) -> str:
@@ -73,7 +73,7 @@ class Result:
 
     @property
     def verdict(self) -> str:
-        """``steady``, ``limit-cycle``, ``diverged`` or ``no-contact``."""
+        """``steady``, ``limit-cycle``, ``growing``, ``diverged``, ``no-contact`` or ``undecided``."""
         return self.summary["verdict"]
 
     def quantity(self, key: str) -> pint.Quantity[float]:

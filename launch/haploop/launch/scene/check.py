@@ -169,7 +169,7 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
             given = "does not fit together" if isinstance(layers.value(key), dict) else None
             layers.complain(key, message, given)
         case "list_type" if isinstance(layers.value(key), dict):
-            layers.complain(key, f"Tables of a list have two pairs of brackets: [[{key[-1]}]].", "is one table")
+            layers.complain(key, f"It must be a list of tables: [[{key[-1]}]], two pairs of brackets.", "is one table")
         case _:
             layers.complain(key, _FORMS.get(what, f"{message}."))
 
@@ -178,7 +178,7 @@ def _of_a_device(layers: Layers, key: KeyPath) -> str:
     """Returns what to do with a file that describes a device and no task; nothing for another."""
     if key != ("duration",) or not layers.data.keys().isdisjoint({"wall", "hand", "dissipation"}):
         return ""
-    name = layers.path.name
+    name = Path(layers.path).name
     return (
         f" A file with a device alone is no scene: haploop advise {name} takes it as it is, and a scene takes it in by "
         f'extends = ["{name}"].'

@@ -236,6 +236,7 @@ class Viewer:
         if not self._wanted:
             return
         words = ["view", "--run", run_id.partition(" ")[0], "--led", *["--until-closed"] * self._until_closed]
+        print("The page is on its way; its address comes in a few seconds.", file=sys.stderr, flush=True)
         self._since = time.monotonic()
         self._process = subprocess.Popen(
             [sys.executable, "-m", "haploop.tools.cli", *words],

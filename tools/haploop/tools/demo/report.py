@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from haploop.tools.demo.story import Story
 from haploop.tools.render.terminal import make_table, verdict_style
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rich.console import RenderableType
 
 
@@ -26,6 +28,14 @@ def report(story: Story) -> RenderableType:
         Text(f"\nWhy: {story.why()}"),
         Text(f"\nAt {story.at_s:g} s, in mid-contact, {story.element} is swapped in. {story.outcome()}"),
         table,
-        *(Text(f"{name}: {part.summary['verdict_rule']}", style="dim") for name, part in story.parts()),
+        *(
+            Text(f"{name}{_judged(part.summary)}: {part.summary['verdict_rule']}", style="dim")
+            for name, part in story.parts()
+        ),
         Text(),
     )
+
+
+def _judged(summary: Mapping[str, Any]) -> str:
+    """Returns what sets the swing of a verdict's sentence apart from that of the run, which the table has."""
+    return ", with the hand held still and a push" if "stability" in summary else ""

@@ -93,6 +93,7 @@ def _times(best: ElementOutcome, other: ElementOutcome) -> str:
     return "as much as" if ratio < 1.005 else f"{fixed(ratio)} times as much as" if ratio < 1e4 else "far more than"
 
 
+_SIZES = "Each element is tried at the size given here alone; at another it takes another amount."
 _IN_CONTACT = "Elements act in contact with the wall only; one with acts=always would everywhere."
 
 
@@ -105,6 +106,7 @@ def note_sentences(outcome: Outcome) -> list[str]:
         f"{notes.rows} samples at {1.0 / recording.period_s:.6g} Hz, {from_s:g} to {to_s:g} s.",
         (f"Taken as recorded: {taken}. " if taken else "") + _estimates(outcome.scene, estimated),
         _truth(outcome),
+        _SIZES if len(outcome.elements) > 1 else "",
         _IN_CONTACT if any(element.acts == "in-contact" for element in outcome.scene.dissipation) else "",
     ]
     if force and outcome.elements:
