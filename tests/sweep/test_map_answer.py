@@ -83,6 +83,16 @@ def test_an_island_of_steady_walls_above_others_that_are_not_is_no_answer(verdic
         assert found.open_end == (best == 3)
 
 
+def test_the_answer_is_not_written_on_cells_that_are_not_steady() -> None:
+    """Of five columns the last alone is steady, too narrow for the long words."""
+    axes = {K: STIFFNESSES, B: [0.0, 2.0, 4.0, 6.0, 8.0]}
+    results = [said("steady" if b == 8.0 else "limit-cycle", 1e-3) for _ in STIFFNESSES for b in axes[B]]
+    drawn = make_figure(table(axes, cells_of(axes), results, [None] * len(results)))
+    (label,) = artists(drawn, "star words")
+    assert label.get_text() == f"≥ {STIFFNESSES[-1]:.0f} N/m"
+    assert label.axes.transData.inverted().transform(label.get_window_extent().min)[0] > 7.0
+
+
 def test_all_failed_says_so_and_marks_no_answer() -> None:
     axes = {K: STIFFNESSES, B: DAMPINGS}
     drawn = make_figure(table(axes, cells_of(axes), [said(None)] * 20, [None] * 20))

@@ -29,6 +29,12 @@ def test_the_scale_follows_the_values(values: list[float], scale: str) -> None:
     assert all(low < at < high for low, at, high in zip(axis.edges, axis.coordinates, axis.edges[1:], strict=False))
 
 
+def test_no_cell_reaches_below_0_where_no_value_is() -> None:
+    axis = Axis.from_column("dissipation.0.damping", "N s/m", [0.0, 2.0, 4.0])
+    assert axis.edges.tolist() == [0.0, 1.0, 3.0, 5.0]
+    assert Axis.from_column("wall.position", "m", [-1.0, 1.0, 3.0]).edges[0] == -2.0
+
+
 def test_short_times_are_written_in_milliseconds_where_they_belong() -> None:
     axis = Axis.from_column("clock.round_trip_delay", "s", [0.0, 0.001, 0.002])
     assert axis.label == "clock.round_trip_delay (ms)"

@@ -70,16 +70,29 @@ class LabelRoom:
         if box := self.best(boxes, lambda box: box.count_overlaps(self._avoided)):
             self.write(box, text, color=colour, gid=gid, bbox=_FRAME, zorder=6)
 
-    def beside(self, x: float, y: float, texts: Sequence[str], colour: str, gid: str) -> None:
-        """Writes the first of some texts that has room beside a sign, which stays free."""
+    def beside(
+        self, x: float, y: float, texts: Sequence[str], colour: str, gid: str, off: Sequence[np.ndarray] = ()
+    ) -> None:
+        """Writes the first of some texts, ever shorter, that has room beside a sign, which stays free.
+
+        Args:
+            off: two opposite corners each of areas that it keeps off, in data coordinates, shape (2, 2); where no text
+                can, the last that has room is written on them.
+        """
+        from matplotlib.transforms import Bbox
+
         self.take(x, y, _STAR_HALF_PX)
-        at = self.pixels((x, y))
+        at, found = self.pixels((x, y)), None
+        avoided = [*self._avoided, *(Bbox(np.sort(self.pixels(corners), axis=0)) for corners in off)]
         for text in texts:
             size = self.size(text)
             boxes = (box for distance in _AROUND_STAR_PX for box in around(at, size, _STAR_HALF_PX + distance))
-            if box := self.best(boxes, lambda box: (box.count_overlaps(self._avoided) > 0, self.crossings(box) > 0)):
-                self.write(box, text, color=colour, gid=gid, bbox=_FRAME, zorder=6, fontweight="bold")
-                return
+            if box := self.best(boxes, lambda box: (box.count_overlaps(avoided) > 0, self.crossings(box) > 0)):
+                found = box, text
+                if not off or not box.count_overlaps(avoided):
+                    break
+        if found:
+            self.write(*found, color=colour, gid=gid, bbox=_FRAME, zorder=6, fontweight="bold")
 
     def best(self, boxes: Iterable[Bbox], penalty: Callable[[Bbox], Any]) -> Bbox | None:
         """Returns the first of the boxes with the least penalty that lie in the panel and cover nothing taken."""

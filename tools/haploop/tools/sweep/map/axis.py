@@ -27,6 +27,8 @@ _LIKE, _RANGE = 1.6, 8.0
 _LETTERS, _LEAST_LETTERS = 90, 10
 # A logarithmic axis that reaches over more has numbers at the powers of ten alone.
 _DECADES = 1000.0
+# Share of a linear axis below its least value, at least.
+_MARGIN = 0.015
 
 
 @dataclass(frozen=True)
@@ -88,11 +90,14 @@ class Axis:
 
     @property
     def edges(self) -> np.ndarray:
-        """Ends of the cells, half way to their neighbours; shape (values + 1,)."""
+        """Ends of the cells, half way to their neighbours, none below 0 where no value is; shape (values + 1,)."""
         at = self.coordinates
         if self.scale == "log":
             return np.exp(_halfway(np.log(at), alone=np.log(3.0)))
-        return _halfway(at, alone=1.0 if self.scale == "even" or not at[0] else abs(at[0]))
+        ends = _halfway(at, alone=1.0 if self.scale == "even" or not at[0] else abs(at[0]))
+        if self.scale == "linear" and at[0] >= 0.0:
+            ends[0] = max(ends[0], 0.0)
+        return ends
 
     @property
     def label(self) -> str:
@@ -117,7 +122,10 @@ class Axis:
             axis.set_ticks(self.coordinates.tolist(), [short(self.coordinates[0])])
         else:
             ax.ticklabel_format(axis=which, useOffset=False, style="plain")
-        ax.set(**{f"{which}lim": (edges[0], edges[-1])})
+        low, high = edges[[0, -1]]
+        if self.scale == "linear":  # what is marked at the end of a cell has room
+            low = min(low, self.coordinates[0] - _MARGIN * (high - low))
+        ax.set(**{f"{which}lim": (low, high)})
         ax.tick_params(axis=which, labelsize=SMALL, colors=GREY, labelcolor=INK if label else "none")
         if label:
             ax.set(**{f"{which}label": self.label})

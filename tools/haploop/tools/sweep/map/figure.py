@@ -24,7 +24,14 @@ from haploop.tools.sweep.map.lines import (
     write_names,
 )
 from haploop.tools.sweep.map.looks import LOOKS, amplitude_scale, verdict_signs
-from haploop.tools.sweep.map.panels import SwingScale, count_disagreement, draw_cells, draw_swings, mark_disagreement
+from haploop.tools.sweep.map.panels import (
+    SwingScale,
+    count_disagreement,
+    draw_cells,
+    draw_swings,
+    mark_disagreement,
+    unsteady_areas,
+)
 from haploop.tools.sweep.map.sentences import description, edge_description, edge_notes, map_notes
 from haploop.tools.sweep.map.sheet import Sheet, fit_title, panel_title
 from haploop.tools.sweep.table import NeedsPyarrow, TableError, read
@@ -98,7 +105,7 @@ def make_figure(data: MapData) -> Figure:
         if found := stiffest_steady(along, panel.cells):
             x, *rest = (axis.coordinates[index] for axis, index in zip(along, found.index, strict=True))
             y = rest[0] if rest else float(swings.place(panel.cells.amplitude_m)[found.index])
-            star = Star(x, y, found.words)
+            star = Star(x, y, found.words, unsteady_areas(along[0], along[1], panel.cells) if rest else ())
         write_names(ax, [over], styles, star, avoid_markers=layout.y is None)
     return sheet.figure
 

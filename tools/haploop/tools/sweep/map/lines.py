@@ -189,11 +189,15 @@ def _across(place: np.ndarray, axes: Sequence[Axis]) -> np.ndarray:
 
 
 class Star(NamedTuple):
-    """The answer of a panel: where its star stands, in the coordinates of the panel, and its label, ever shorter."""
+    """The answer of a panel: where its star stands, in the coordinates of the panel, and its label, ever shorter.
+
+    ``off`` are corners of the areas of which it does not speak, which the label keeps off.
+    """
 
     x: float
     y: float
     texts: Sequence[str]
+    off: Sequence[np.ndarray] = ()
 
 
 def write_names(
@@ -210,7 +214,7 @@ def write_names(
     room.avoid_lines(piece for panel in panels for pieces in panel.drawn.values() for piece in pieces)
     if star:
         ax.plot(star.x, star.y, "*", color=_STAR, markersize=13, markeredgecolor="white", zorder=6, gid="star")
-        room.beside(star.x, star.y, star.texts, _STAR, "star words")
+        room.beside(star.x, star.y, star.texts, _STAR, "star words", star.off)
     for name, pieces in panels[0].drawn.items() if len(panels) == 1 else ():
         if pieces:
             room.on_line(max(pieces, key=len), name, styles[name]["color"], "name of a line")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,14 +47,25 @@ def _hatch(ax: Axes, edges: tuple[np.ndarray, np.ndarray], where: np.ndarray, lo
     from matplotlib.path import Path
 
     boxes = []
-    for row, marked in enumerate(where):
-        y0, y1 = edges[1][row : row + 2]
-        ends = edges[0][np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(int), [0]])))]
-        for x0, x1 in zip(ends[::2], ends[1::2], strict=True):
-            boxes.append(Path([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)], closed=True))
+    for (x0, y0), (x1, y1) in _runs(edges, where):
+        boxes.append(Path([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)], closed=True))
     path = Path.make_compound_path(*boxes)
     style = {"facecolor": "none", "edgecolor": look.hatch_colour, "hatch": look.hatch, "linewidth": 0}
     ax.add_patch(PathPatch(path, zorder=1.2, gid=gid, **style))
+
+
+def _runs(edges: tuple[np.ndarray, np.ndarray], where: np.ndarray) -> Iterator[np.ndarray]:
+    """Yields opposite corners of the unbroken runs of marked cells in every row, shape (2, 2)."""
+    for row, marked in enumerate(where):
+        ends = edges[0][np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(int), [0]])))]
+        for x0, x1 in zip(ends[::2], ends[1::2], strict=True):
+            yield np.array([(x0, edges[1][row]), (x1, edges[1][row + 1])])
+
+
+def unsteady_areas(x: Axis, y: Axis, cells: Cells) -> list[np.ndarray]:
+    """Returns opposite corners of the areas of cells that ran and are not steady, shape (2, 2) each."""
+    verdict = cells.verdict.T
+    return list(_runs((x.edges, y.edges), (verdict != Verdict.STEADY) & (verdict != NOT_RUN)))
 
 
 def _outline(ax: Axes, edges: tuple[np.ndarray, np.ndarray], verdict: np.ndarray) -> None:

@@ -127,7 +127,7 @@ def _fine_values(axis: Axis, points: int) -> np.ndarray:
     else:
         space = np.geomspace if axis.scale == "log" else np.linspace
         found = space(axis.edges[0], axis.edges[-1], points) * axis.factor_and_unit[0]
-        found = found[found >= 0.0] if values[0] >= 0.0 else found
+        found = found[found > 0.0] if values[0] >= 0.0 else found
     return np.unique([values[0], *found, values[-1]])
 
 
