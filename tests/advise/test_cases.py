@@ -6,10 +6,12 @@ import pytest
 from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.file import load
 from haploop.protocol.scene.paths import value_at
+from haploop.tools.advise.advice import reach
 from haploop.tools.advise.subject import assumptions
 from haploop.tools.advise.walls.cases import (
     HOLDS,
     Case,
+    as_described,
     attack,
     every_case,
     hold_N,
@@ -61,6 +63,18 @@ def test_an_assumed_number_is_taken_half_and_double_and_not_a_fifth_off_with_its
     cable = scale_quantities(loop_of("premium15_cable"), {"device mass": 1.2, "transmission.motor_mass": 0.5})
     assert value_at(cable, "device.mass") == pytest.approx(1.2 * 0.0496)
     assert value_at(cable, "transmission.motor_mass") == pytest.approx(0.5 * 0.0029)
+
+
+def test_a_measured_cable_is_a_corner_and_what_no_case_varies_is_told():
+    loop = loop_of("premium15_cable")
+    assert ranges(loop)["cable stiffness"] == (0.8, 1.2)
+    assert as_described(loop, ranges(loop))[:2] == ("friction", "cable damping")
+    assumed = ranges(loop, ["friction.kinetic", "transmission.stiffness"])
+    assert "cable stiffness" not in assumed
+    assert "friction" not in as_described(loop, assumed)
+    words = reach(assumed, as_described(loop, assumed))
+    assert words.startswith("Not varied: cable damping, motor damping, encoder, ")
+    assert words.endswith("Halved and doubled: friction.kinetic, transmission.stiffness.")
 
 
 def test_a_delay_a_fifth_more_is_rounded_to_whole_steps_and_never_to_what_it_was():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -12,7 +12,16 @@ from haploop.tools.advise.changes import assumed_otherwise, changed_limits, chan
 from haploop.tools.advise.known import PUBLISHED, Formula, Published, formulas
 from haploop.tools.advise.search import Found, search
 from haploop.tools.advise.subject import Assumed, Subject
-from haploop.tools.advise.walls.cases import Case, every_case, is_number, make_loop, ranges, task_words
+from haploop.tools.advise.walls.cases import (
+    ASSUMED,
+    Case,
+    as_described,
+    every_case,
+    is_number,
+    make_loop,
+    ranges,
+    task_words,
+)
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.walls.trial import Failure, Trial, Tried
 from haploop.tools.linear.linearity import installed_kinds
@@ -23,8 +32,8 @@ UPPER_BOUND = (
     "Upper bound, not advice: {name} is taken as rigid and its loop as without delay, "
     "as no device is. Give --delay and a [transmission]."
 )
-ADVICE = "Advice on {name}, as described and 20 % off."
-WIDE = "Advice on {name}, as described, 20 % off, and with half and twice of what is assumed."
+ADVICE = "Advice on {name}."
+VARIED, HALVED, NOT_VARIED = "Varied by 20 %: {0}.", "Halved and doubled: {0}.", "Not varied: {0}."
 _RIGID = "There is no [transmission]: what a resonance of the structure takes is not in it."
 _PLUGIN = "The scene's own wall is not tried: its elements come from a plugin file."
 HOLDS_MORE = (
@@ -62,6 +71,7 @@ class Advice:
         is_ideal: whether the device is rigid and its loop without delay: then it is an upper bound.
         tried_by: what every wall was tried by, in words.
         uncertain: the factors between which each uncertain quantity, or assumed number, was taken.
+        not_varied: what the loop has and was taken as described.
         described: the limit of the loop as described, with the element advised or without any.
         changed, without: that after each change of the device, and without each cause of buzzing, best first.
         assumed: each assumed number with the limit at half and at double of it.
@@ -74,6 +84,7 @@ class Advice:
     is_ideal: bool
     tried_by: str
     uncertain: dict[str, tuple[float, float]]
+    not_varied: tuple[str, ...]
     found: Found
     formulas: tuple[Formula, ...]
     published: tuple[Published, ...]
@@ -87,8 +98,8 @@ class Advice:
 
     @property
     def headline(self) -> str:
-        words = UPPER_BOUND if self.is_ideal else WIDE if self.assumed else ADVICE
-        return words.format(name=self.name)
+        lead = (UPPER_BOUND if self.is_ideal else ADVICE).format(name=self.name)
+        return f"{lead} {reach(self.uncertain, self.not_varied)}"
 
 
 def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lambda name: None) -> Advice:
@@ -125,7 +136,8 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
         notes=(*subject.notes, *notes, *told),
         is_ideal=is_ideal(loop),
         tried_by=task_words(loop),
-        uncertain=ranges(loop, keys),
+        uncertain=(of := ranges(loop, keys)),
+        not_varied=as_described(loop, of),
         found=found,
         formulas=tuple(formulas(loop)),
         published=PUBLISHED.get(subject.name, ()),
@@ -137,6 +149,14 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
         scene=_shown(subject, loop, found),
         runs=trial.runs,
     )
+
+
+def reach(uncertain: Mapping[str, tuple[float, float]], not_varied: Sequence[str]) -> str:
+    """Returns the sentences that say what was varied, and by how much, and what was not."""
+    wide = [name for name, ends in uncertain.items() if ends == ASSUMED]
+    varied = [name for name in uncertain if name not in wide]
+    told = zip((NOT_VARIED, VARIED, HALVED), (not_varied, varied, wide), strict=True)
+    return " ".join(sentence.format(", ".join(names)) for sentence, names in told if names)
 
 
 def is_ideal(loop: Scene) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from haploop.tools.advise.advice import Advice
-from haploop.tools.advise.report import answer, format_limit, format_stiffness, moves
+from haploop.tools.advise.report import format_limit, format_stiffness, moves, sentences
 from haploop.tools.figure import style
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def figure_of(told: Advice) -> Figure:
     for of, half, double in (row for row in told.assumed if moves(row[1], row[2], told.described)):
         others += [(f"{of.key} halved (assumed)", half.stiffness_N_m, format_limit(half))]
         others += [(f"{of.key} doubled (assumed)", double.stiffness_N_m, format_limit(double))]
-    lines = [line for name, words in answer(told) for line in textwrap.wrap(f"{name}: {words}", _LETTERS)]
+    lines = [line for sentence in sentences(told) for line in textwrap.wrap(sentence, _LETTERS)]
     heights = [
         (len(told.found.bests) + len(told.formulas) + len(told.published)) * _ROW_IN + _BESIDE_IN + 0.2 * len(lines),
         len(others) * _ROW_IN + _BESIDE_IN,

@@ -39,6 +39,19 @@ _KEYS = {
     "hand mass": "hand.mass",
     "hand damping": "hand.damping",
     "hand stiffness": "hand.stiffness",
+    "cable stiffness": "transmission.stiffness",
+}
+# What is taken as described unless it is assumed, and its key.
+_AS_DESCRIBED = {
+    "friction": "friction.kinetic",
+    "device damping": "device.damping",
+    "cable damping": "transmission.damping",
+    "motor damping": "transmission.motor_damping",
+    "encoder": "encoder.resolution",
+    "noise": "noise.deviation",
+    "actuator": "actuator.saturation",
+    "bandwidth": "actuator.bandwidth",
+    "sampling": "clock.control_rate",
 }
 _STAYS = (None, "constant", "ramp", "step", "minimum-jerk")
 # A search takes a regular fraction of the corners: all of so many quantities, each further one as the parity of some of
@@ -137,6 +150,11 @@ def ranges(loop: Scene, assumed: Sequence[str] = ()) -> dict[str, tuple[float, f
         if any(value_at(loop, key) for key in _keys_of(name) if key not in assumed):
             found[name] = TOLERANCE
     return found | {key: ASSUMED for key in assumed if is_number(value_at(loop, key))}
+
+
+def as_described(loop: Scene, of: Ranges) -> tuple[str, ...]:
+    """Returns what the loop has and no case varies."""
+    return tuple(name for name, key in _AS_DESCRIBED.items() if value_at(loop, key) and key not in of)
 
 
 def is_number(value: object) -> bool:
