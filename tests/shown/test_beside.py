@@ -99,7 +99,8 @@ def test_an_overlay_draws_every_run_with_its_name_and_what_differs(runs):
     told = [text.get_text() for text in artists(figure, "label")]
     # What has no room is cut off.
     assert all(full.startswith(seen.rstrip(" …")) for full, seen in zip(labels(given), told, strict=True))
-    assert "clock.control_rate 500" in told[3]
+    assert "clock.control_rate 500 Hz" in told[3]
+    assert not any("–" in label for label in labels(given)), "a key that a run has not is not told of it"
     assert labels(data(runs, "a", "a")) == [given[0].scene.title] * 2
     assert list(unlike_keys([given[0].scene, given[3].scene])) == ["clock.control_rate", "clock.round_trip_delay"]
     drawn = artists(figure, "energy")[0].get_ydata()

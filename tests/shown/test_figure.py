@@ -183,7 +183,7 @@ def test_events_are_marked_at_their_times_and_named(runs: dict[str, Path]) -> No
     labels = [text.get_text() for text in artists(figure, "event-label")]
     assert labels == ["1", "2", "3", "4", "5"]
     (words,) = event_lines(data)[:1]
-    assert "1 at 0.95 s: element 1 becomes unidirectional-inertia (mass 0.002)" in words
+    assert "1 at 0.95 s: element 1 becomes unidirectional-inertia (mass 0.002 kg)" in words
     assert "3 at 1.1 s: element 0 is removed" in " ".join(event_lines(data))
 
 

@@ -12,6 +12,7 @@ from haploop.tools.figure import style
 from haploop.tools.figure.data import Book, FigureError, RunData
 from haploop.tools.figure.difference import scene_value, unlike_keys
 from haploop.tools.figure.run_figure import key_numbers
+from haploop.tools.figure.scene_units import unit_at
 from haploop.tools.figure.time import MM, line
 from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount, prefix_for
@@ -68,12 +69,17 @@ def make_overlay(runs: Sequence[RunData]) -> Figure:
 def labels(runs: Sequence[RunData]) -> list[str]:
     """Returns for each run its name and what of its scene is not the same in all."""
     unlike = unlike_keys([run.scene for run in runs])
-    told_keys = list(unlike)[:_MOST_KEYS]
-    more = f" and {len(unlike) - _MOST_KEYS} more" if len(unlike) > _MOST_KEYS else ""
     if not unlike:
         return [run.scene.title for run in runs]
-    told_values = [[f"{key} {scene_value(unlike[key][place])}" for key in told_keys] for place in range(len(runs))]
-    return [f"{run.scene.title} ({', '.join(values)}{more})" for run, values in zip(runs, told_values, strict=True)]
+    found = []
+    for place, run in enumerate(runs):
+        own = {key: values[place] for key, values in unlike.items() if values[place] is not None}
+        words = [f"{key} {scene_value(value)} {unit_at(run.scene, key)}".rstrip() for key, value in own.items()]
+        # Where it has none of the keys, those of the others.
+        words = words or [f"no {key}" for key in unlike]
+        more = f" and {len(words) - _MOST_KEYS} more" if len(words) > _MOST_KEYS else ""
+        found.append(f"{run.scene.title} ({', '.join(words[:_MOST_KEYS])}{more})")
+    return found
 
 
 def _head(header: Figure | SubFigure, run: RunData, label: str, y: float, colour: str) -> None:

@@ -10,6 +10,7 @@ from haploop.tools.figure import style
 from haploop.tools.figure.data import TOGETHER, Book, RunData
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
 from haploop.tools.figure.own_columns import draw_own_columns, own_columns
+from haploop.tools.figure.scene_units import element_units
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
 from haploop.tools.render.report import HELD, count_losses, leak_rows, plant_books, swing_words
 from haploop.tools.render.terminal import told
@@ -145,7 +146,7 @@ def book_rows(run: RunData, books: list[Book]) -> list[Row]:
     for book in [*shown[:_MOST_BOOKS], *together]:
         name, at_work = book.name, ""
         if span := spans.get(book.name):
-            name = f"{book.name} ({parameters(span.element.as_dict())})"
+            name = f"{book.name} ({parameters(span.element.as_dict(), element_units())})"
             end_s = min(span.to_tick / run.control_rate, run.span_s[1])
             at_work = f"{span.from_tick / run.control_rate:g}–{end_s:g}"
         true, sampled = (amount(value, "J") for value in book.ends_J)
@@ -164,7 +165,7 @@ def event_lines(run: RunData) -> list[str]:
     """Returns the numbered events as lines that fit below the figure."""
     lines = [""]
     for number, event in enumerate(run.events, start=1):
-        words = f"{number} at {event['timestamp']:g} s: {describe(event)}"
+        words = f"{number} at {event['timestamp']:g} s: {describe(event, element_units())}"
         if lines[-1] and len(lines[-1]) + len(words) + 5 > _LINE_LETTERS:
             if len(lines) == _MOST_LINES:
                 lines[-1] += f"     and {len(run.events) - number + 1} more"

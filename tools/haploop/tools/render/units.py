@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
+_NO_UNITS: Mapping[str, str] = MappingProxyType({})
 PREFIXES = {1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
 
 
@@ -50,10 +52,16 @@ def spring(stiffness_N_m: float | None) -> str:
     return f"{fixed(stiffness_N_m)} N/m"
 
 
-def parameters(table: dict[str, Any]) -> str:
-    """Returns an element's parameters in short, ``"mass 0.01, always"``; acting in contact goes without saying."""
+def parameters(table: dict[str, Any], units: Mapping[str, str] = _NO_UNITS) -> str:
+    """Returns an element's parameters in short, ``"mass 0.01 kg, always"``; acting in contact goes without saying.
+
+    ``units`` are by kind and parameter (``damping.damping``); the number of one that is not there is bare.
+    """
     own = {name: value for name, value in table.items() if name not in ("kind", "acts")}
+    kind = table.get("kind")
     words = [
-        f"{name} {str(value).lower() if isinstance(value, str | bool) else f'{value:g}'}" for name, value in own.items()
+        f"{name} {str(value).lower() if isinstance(value, str | bool) else f'{value:g}'} "
+        f"{units.get(f'{kind}.{name}', '')}".rstrip()
+        for name, value in own.items()
     ]
     return ", ".join(words + (["always"] if table.get("acts") == "always" else []))
