@@ -75,8 +75,8 @@ def test_a_sweep_is_found_by_its_name_and_names_its_scene_so():
             "premium_tip",
             "There is no such file, and no scene of that name comes with haploop; did you mean premium_tap?",
         ),
-        ("some/fig6c.toml", "There is no such file."),
-        ("../scenes/fig6c.toml", "There is no such file."),
+        ("some/fig6c.toml", "There is no such file; did you mean fig6c?"),
+        ("../scenes/fig6c.toml", "There is no such file; did you mean fig6c?"),
         ("x" * 5000, "The file cannot be read: File name too long."),
     ],
 )
