@@ -129,6 +129,7 @@ class Controller:
         self.recorder.cut()
         while self._changes and self._changes[0].tick <= self.tick:
             change = self._changes.pop(0)
+            params = self.params
             try:
                 params, after = apply_change(change, self.params, state, self._kinds)
                 if change.swap is not None and change.swap.name != NO_ELEMENT:

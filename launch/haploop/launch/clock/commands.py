@@ -173,7 +173,7 @@ class Commands:
             raise ClockError(f"{says}, but {kind} was asked for.")
         before = self._clock.scene_at(self._clock.tick_at(at)).dissipation
         done = self._swapped(change, before, self._clock.change(change, at))
-        is_known = kind == NO_ELEMENT or self._spec.kinds[kind].__module__.startswith("haploop.")
+        is_known = kind == NO_ELEMENT or self._spec.kinds[str(kind)].__module__.startswith("haploop.")
         return done if is_known else self._on_probation(done)
 
     def _swap_tried(self, change: Event, at: float | None, reload: bool) -> Generator[None, None, Done]:
@@ -261,8 +261,9 @@ class Commands:
             return self._clock.change(back)
         now, file = self._code(), code["plugin_files"].get(back["swap"]["kind"])
         self._take_code(code)
+        extra: dict[str, Any] = {"plugin": str(file.resolve())} if file else {}
         try:
-            return self._clock.change(back, **({"plugin": str(file.resolve())} if file else {}))
+            return self._clock.change(back, **extra)
         except Exception:
             self._take_code(now)
             raise

@@ -31,6 +31,7 @@ def parse(
 
     Raises SceneError where it is missing, empty, no file, no text or no TOML (with line and column).
     """
+    text = ""
     try:
         text = read_text(path)
         try:
