@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import haploop.logger
 from haploop.launch.runs.start import prepare, run
@@ -125,6 +126,17 @@ def test_the_figure_draws_all_bodies_and_forces_of_the_plant_and_counts_what_was
     assert marked["commands lost"].true == str(poor[1]["lost"]["commands_lost"])
     none = make_figure(RunData.from_directory(plain[0]))
     assert not any(artists(none, name) for name in ("tip", "hand", "friction", "actuator", "saturation"))
+
+
+def test_every_force_stands_in_the_legend_and_no_legend_covers_a_title(poor):
+    figure = make_figure(RunData.from_directory(poor[0]))
+    figure.draw_without_rendering()
+    panels = {ax.get_title(loc="left"): ax for ax in figure.get_axes()}
+    named = [text.get_text() for text in panels["Force by part"].get_legend().get_texts()]
+    assert {"wall", "friction", "actuator"} <= set(named)
+    for title, ax in panels.items():
+        boxes = [text.get_window_extent() for text in ax.findobj(Text) if title and text.get_text() == title]
+        assert not ax.get_legend() or not ax.get_legend().get_window_extent().count_overlaps(boxes)
 
 
 def test_a_log_without_plant_steps_draws_and_its_books_are_the_same(poor, tmp_path):

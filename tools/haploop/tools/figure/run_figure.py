@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-# What has room in the table and below the figure.
-_MOST_BOOKS, _MOST_LINES, _LINE_LETTERS = 7, 2, 225
+# What has room in the table and below the figure; longer names of books are smaller.
+_MOST_BOOKS, _NAME_LETTERS, _MOST_LINES, _LINE_LETTERS = 7, 56, 2, 225
 
 # Books of the plant that belong to a force which is drawn.
 _LINES = {"friction_heat_J": "friction", "actuator_J": "actuator"}
@@ -121,7 +121,8 @@ def _draw_books(ax: Axes, run: RunData, books: list[Book], colours: dict[str, st
         if row.book:
             ax.plot([0.03, 0.06], [y, y], color=colours[row.book], linewidth=2.5, solid_capstyle="butt")
         colour, weight = style.INK if row.book or not number else style.GREY, "normal" if number else "bold"
-        ax.text(0.075, y, row.name, ha="left", va="center", fontsize=size, color=colour, fontweight=weight)
+        own = size * min(1.0, _NAME_LETTERS / max(1, len(row.name)))
+        ax.text(0.075, y, row.name, ha="left", va="center", fontsize=own, color=colour, fontweight=weight)
         for x, text in ((0.56, row.at_work), (0.72, row.true), (0.88, row.sampled)):
             ax.text(x, y, text, ha="right", va="center", fontsize=size, color=colour, fontweight=weight)
 
