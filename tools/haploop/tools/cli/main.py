@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from copy import copy
 
 from haploop.tools.cli.interrupt import SENTENCE, TYPE_CHECKING, LeavingAtOnce
 
@@ -31,12 +32,13 @@ def main() -> None:
             from haploop.tools.cli.app import app
 
             # Typer makes every command that it has, a fifth of what it takes, to call the one that is asked for.
-            app.registered_commands = [
+            asked = copy(app)
+            asked.registered_commands = [
                 command for command in app.registered_commands if command.name in sys.argv[1:2]
             ] or app.registered_commands
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         _refuse_what_is_no_text(sys.argv[1:])
-        app(obj={"early": early})  # typer puts things of its own beside it
+        asked(obj={"early": early})  # typer puts things of its own beside it
     except OSError as error:  # one that no command has words of its own for
         print(f"{error.filename or 'A file'} cannot be used: {error.strerror or error}.", file=sys.stderr)
         sys.exit(1)
