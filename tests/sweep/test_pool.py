@@ -94,7 +94,7 @@ def test_of_the_scenes_that_were_under_way_when_a_worker_died_only_the_culprits_
 def test_a_plugin_that_does_not_load_is_said_before_anything_is_started(tmp_path: Path) -> None:
     path = tmp_path / "broken.py"
     path.write_text("1 / 0")
-    with pytest.raises(PluginError, match=r"broken\.py does not load: ZeroDivisionError"):
+    with pytest.raises(PluginError, match=r"broken\.py, line 1 does not load: ZeroDivisionError"):
         results([pressed(100.0)], [path])
 
 
