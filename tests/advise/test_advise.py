@@ -14,9 +14,9 @@ from haploop.tools.advise.advice import is_ideal
 from haploop.tools.advise.families import DAMPING
 from haploop.tools.advise.known import PUBLISHED, formulas
 from haploop.tools.advise.report import assumes
-from haploop.tools.advise.search import Best, rounded_down
 from haploop.tools.advise.subject import Assumed
 from haploop.tools.advise.walls.limit import Limit
+from haploop.tools.advise.withstand import Best, rounded_down
 from haploop.tools.cli.app import app
 from helpers.scenes.presets import loop_of
 

@@ -40,6 +40,7 @@ HOLDS_MORE = (
     "A {0} ({1}), which renders less than its wall, may hold more: {2:.2g} N/mm in the loop as described. It was not "
     "tried in every corner; `haploop compare` tells what it holds."
 )
+FELL = "With {0} it bears {1:.2g} N/mm in every corner at three holds, but not {2:.3g} N/mm at others or under attack."
 NO_OTHER = "With none of these, at seven parameters each, does the loop as described bear {0:.2g} N/mm: {1}."
 READING = (
     "Every corner: what is uncertain 20 % more or less, what is assumed half or twice, in all combinations, or 32 of "
@@ -110,6 +111,11 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
     found = search(loop, keys, trial, stage)
     told = [NO_OTHER.format(found.simple_N_m / 1e3, "; ".join(each.name for each in found.others))] * bool(found.others)
     told += [HOLDS_MORE.format(of.family.name, of.family.words(of.values), of.held_N_m / 1e3) for of in found.hidden]
+    told += [
+        FELL.format(of.family.phrase(of.values), of.safe.stiffness_N_m / 1e3, below / 1e3)
+        for of, below in found.fell
+        if of.safe
+    ]
     stage("changes of the device")
     altered, ideal, otherwise = changes(loop), idealised(loop), assumed_otherwise(loop, keys)
     loops = [loop, *altered.values(), *ideal.values(), *otherwise.values()]

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from haploop.launch.plan.effects import all_effects
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.advise.search import Best
 from haploop.tools.advise.walls.cases import ASSUMED, DELAY, FIRST_HOLDS, Case, delay_s
 from haploop.tools.advise.walls.limit import Limit, Query, ladder, limits
 from haploop.tools.advise.walls.trial import Trial
+from haploop.tools.advise.withstand import Best
 
 # How closely these limits are found.
 CLOSE = 0.06

@@ -10,9 +10,9 @@ from rich.text import Text
 
 from haploop.tools.advise.advice import READING, Advice
 from haploop.tools.advise.changes import CLOSE
-from haploop.tools.advise.search import ROUGH, WORTH, Best
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.walls.trial import Failure
+from haploop.tools.advise.withstand import ROUGH, WORTH, Best
 from haploop.tools.render.terminal import make_facts, make_table
 from haploop.tools.render.units import amount, fixed
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from haploop.launch.stability.judge import judge_scene
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.families import (
     BOTH,
@@ -22,40 +20,14 @@ from haploop.tools.advise.families import (
     together,
 )  # fmt: skip
 from haploop.tools.advise.others import Choice, Hidden, hiding, others_bearing, worth_more
-from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, Ranges, attack, corner, every_case, ranges
+from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, Ranges, attack, every_case, ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, Limit, Query, ladder, limits
-from haploop.tools.advise.walls.trial import Failure, Trial, Tried
-from haploop.tools.linear.linearity import installed_kinds
+from haploop.tools.advise.walls.trial import Trial
+from haploop.tools.advise.withstand import BEYOND, ROUGH, WORTH, Best, Broken, advised, rivals, withstand
 
-# How closely limits are found while elements are compared, and that of the one advised.
-ROUGH, _FINE = 0.12, 0.02
-# An element that allows no more than this much beyond a simpler one is not worth having.
-WORTH = 1.1
-# Softer walls that have to bear everything, too, as shares of the limit.
-_SOFTER = (0.8, 0.62, 0.48, 0.35, 0.25, 0.15, 0.08, 0.03)
 # Parameters that are tried in every corner, by their places among those that bear as much in the loop as described;
 # what suits a device of half the mass is smaller.
 _MANY, _WIDE, _ONE = (0.0, 0.5, 1.0), (-1.0, 0.0, 1.0), (0.5,)
-# A wall that does not withstand the attack is lowered by this, so often at most.
-_LOWER, _TIMES = 0.97, 60
-# So much stiffer walls have to withstand it, too: where a count lies in the hold is chance, and differs with each.
-_BEYOND = (1.0, 1.02, 1.04)
-_STEADY = ("steady", "no-contact")
-
-
-@dataclass(frozen=True)
-class Best:
-    """The best of one family.
-
-    Attributes:
-        nominal: the limit of the loop as described, at the holds tried first.
-        safe: the limit in every corner, where the family came that far; None where a simpler one bears as much.
-    """
-
-    family: Family
-    values: Values
-    nominal: Limit
-    safe: Limit | None = None
 
 
 @dataclass(frozen=True)
@@ -71,17 +43,19 @@ class Found:
         cases: how many it was tried in, attack included.
         others: elements that bear no wall of ``simple_N_m`` as described, the best of the simple ones.
         hidden: elements that render less than their wall, and may hold more than any other.
+        fell: what bore more in every corner, and the softest wall, N/m, known not to bear everything with it.
     """
 
     bests: tuple[Best, ...]
     advised: Best
     stiffness_N_m: float
     as_assumed: Best | None
-    breaks: tuple[float, Failure] | None
+    breaks: Broken | None
     cases: int
     others: tuple[Family, ...] = ()
     simple_N_m: float = 0.0
     hidden: tuple[Hidden, ...] = ()
+    fell: tuple[tuple[Best, float], ...] = ()
 
 
 def search(
@@ -117,19 +91,18 @@ def search(
     stage("every corner")
     of, measured = ranges(loop, assumed), ranges(loop)
     bests = _in_corners(loop, trial, known, of, _MANY if of == measured else _WIDE, some)
-    as_assumed = None if of == measured else _advised(_in_corners(loop, trial, known, measured, _ONE, some))
-    best = _advised(bests)
-    values, safe = _refined(loop, trial, best, of)
-    described = known.get((best.family, values)) or nominal([(best.family, values)], *rungs)[best.family, values]
-    advised = Best(best.family, values, described, safe)
-    stage("softer walls")
-    top = _softer(loop, trial, advised, of)
-    stage("the attack")
-    stiffness, broken = _attacked(loop, trial, advised, top, of)
-    cases = len(_BEYOND) * len(attack(of)) + len(every_case(of))
-    shown = tuple(advised if each is best else each for each in bests)
+    as_assumed = None if of == measured else advised(_in_corners(loop, trial, known, measured, _ONE, some))
+    stage("softer walls and the attack")
+    compared = rivals(bests)
+    won = withstand(loop, trial, compared, of)
+    choice = won.best.family, won.best.values
+    described = known.get(choice) or nominal([choice], *rungs)[choice]
+    best = replace(won.best, nominal=described)
+    fell = tuple((each.best, each.broken[0]) for each in compared if each is not won and each.broken)
+    cases = len(BEYOND) * len(attack(of)) + len(every_case(of))
+    shown = tuple(best if each.family is best.family else each for each in bests)
     others = tuple(family for family in OTHERS if family not in good)
-    return Found(shown, advised, stiffness, as_assumed, broken, cases, others, simple, hidden)
+    return Found(shown, best, won.bound_N_m, as_assumed, won.broken, cases, others, simple, hidden, fell)
 
 
 def _equals(known: dict[Choice, Limit], family: Family) -> list[Values]:
@@ -187,88 +160,3 @@ def _in_corners(
             values = max(of_family, key=lambda some: (of_family[some].stiffness_N_m, [-value for value in some]))
             bests[place] = Best(best.family, values, known[best.family, values], of_family[values])
     return bests
-
-
-def _advised(bests: Sequence[Best]) -> Best:
-    """Returns the family that bears most in every corner; one with more elements has to bear a tenth more."""
-    advised = bests[0]
-    for best in bests[1:]:
-        less = advised.safe.stiffness_N_m if advised.safe else 0.0
-        if best.safe and best.safe.stiffness_N_m > WORTH * less:
-            advised = best
-    return advised
-
-
-def _refined(loop: Scene, trial: Trial, best: Best, of: Ranges) -> tuple[Values, Limit]:
-    """Returns parameters moved half a step up or down, as often as that bears more in every corner, and their limit."""
-    assert best.safe
-    values, safe, tried = best.values, best.safe, {best.values}
-    while near := safe.stiffness_N_m:
-        new = [other for other in beside(values) if other not in tried]
-        rungs, cases = ladder(near, near * 1.5, 1.07), every_case(of, FIRST_HOLDS)
-        found = limits(trial, [Query(loop, best.family.elements(each), cases, rungs) for each in new], ROUGH / 2.0)
-        tried |= set(new)
-        more = max(zip(new, found, strict=True), key=lambda each: each[1].stiffness_N_m, default=None)
-        if not more or more[1].stiffness_N_m <= near * 1.01:
-            break
-        values, safe = more
-    return values, safe
-
-
-def _softer(loop: Scene, trial: Trial, advised: Best, of: Ranges) -> Limit:
-    """Returns the limit at every hold in every corner, with all softer walls bearing it, too."""
-    assert advised.safe
-    near = advised.safe.stiffness_N_m
-    if not near:
-        return advised.safe
-    elements, cases = advised.family.elements(advised.values), every_case(of)
-    rungs = (*sorted(near * share for share in _SOFTER), near, min(advised.safe.fails_N_m, near * 1.1))
-    return limits(trial, [Query(loop, elements, cases, rungs)], _FINE)[0]
-
-
-def _attacked(
-    loop: Scene, trial: Trial, advised: Best, top: Limit, of: Ranges
-) -> tuple[float, tuple[float, Failure] | None]:
-    """Lowers the wall until no attack breaks it: projected friction in every case, exact friction in a few.
-
-    Returns the stiffness, and the softest wall that broke with what it does.
-    """
-    elements, cases = advised.family.elements(advised.values), attack(of)
-    broken = (top.fails_N_m, top.failure) if top.failure else None
-    stiffness = rounded_down(top.stiffness_N_m)
-    for _ in range(_TIMES):
-        if stiffness < LEAST_N_M:
-            break
-        found = trial.failures(loop, [Tried(share * stiffness, elements) for share in _BEYOND], cases)
-        broke = ((share, each) for share, each in zip(_BEYOND, found, strict=True) if each)
-        share, failure = next(broke, None) or (1.0, _judged(loop, Tried(stiffness, elements), of))
-        if not failure:
-            return stiffness, broken
-        broken = share * stiffness, failure
-        stiffness = rounded_down(stiffness * _LOWER)
-    return 0.0, broken
-
-
-def _judged(loop: Scene, wall: Tried, of: Ranges) -> Failure | None:
-    """Judges the wall by pushes and with exact friction, see ``haploop.launch.stability``, in the cases tried first.
-
-    They are the loop as described and the likely worst corner, in which all that is uncertain is least.
-    """
-    for case in (Case(hold, some, sway=0.0) for some in ((), corner(of, 0)) for hold in FIRST_HOLDS):
-        scene = case.scene(loop)
-        assert scene.wall
-        scene = replace(scene, wall=replace(scene.wall, stiffness=wall.stiffness_N_m), dissipation=wall.elements)
-        found = judge_scene(scene, installed_kinds())
-        if found.word not in _STEADY and not (found.word == "limit-cycle" and not found.felt):
-            numbers = found.width_m, found.force_ripple_N, found.frequency_Hz
-            return Failure(f"{case.words}, pushed: {found.word}", scene.duration, found.word == "diverged", *numbers)
-    return None
-
-
-def rounded_down(stiffness: float) -> float:
-    """Returns a stiffness rounded down to three digits; of one that begins with 5 or more the last is 0 or 5."""
-    if not stiffness:
-        return 0.0
-    unit = 10.0 ** (math.floor(math.log10(stiffness)) - 2)
-    unit *= 5.0 if stiffness >= 500.0 * unit else 1.0
-    return float(f"{math.floor(stiffness / unit * (1.0 + 1e-12)) * unit:.12g}")

@@ -1,0 +1,76 @@
+"""The wall advised withstands the attack, with whichever element bears most then; no element is one of the choices."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from haploop.tools.advise.families import BOTH, DAMPING, NOTHING, Family
+from haploop.tools.advise.walls.limit import Limit
+from haploop.tools.advise.walls.trial import Failure
+from haploop.tools.advise.withstand import Best, rivals, withstand
+from helpers.scenes.presets import loop_of
+
+LOOP = loop_of("premium15")
+FAILS = Failure("a case", 1.0, gone=False)
+VALUES = {NOTHING: (), DAMPING: (5.0,), BOTH: (2.0, 0.001)}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _pushed_walls_rest():
+    with pytest.MonkeyPatch.context() as patch:
+        rests = SimpleNamespace(word="steady", felt=False)
+        patch.setattr("haploop.tools.advise.withstand.judge_scene", lambda scene, kinds: rests)
+        yield
+
+
+def won_of(walls: dict[Family, tuple[float, float]]):
+    """The rival that wins, of families that bear and withstand so stiff walls, N/m."""
+    count = {len(family.parts): walls[family] for family in walls}
+
+    def of_jobs(jobs):
+        return [[None if k.stiffness_N_m < count[len(_sizes(k))][0] else FAILS for k in job.walls] for job in jobs]
+
+    def failures(loop, some, cases):
+        return [None if k.stiffness_N_m < count[len(_sizes(k))][1] else FAILS for k in some]
+
+    trial: Any = SimpleNamespace(of_jobs=of_jobs, failures=failures)
+    bests = []
+    for family, (borne, _) in walls.items():
+        limit = Limit(0.98 * borne, borne, FAILS)
+        bests.append(Best(family, VALUES[family], limit, limit))
+    return withstand(LOOP, trial, rivals(bests), {})
+
+
+def _sizes(wall):
+    return [size for element in wall.elements for size in element.parameters.values()]
+
+
+@pytest.mark.parametrize(
+    ("walls", "family", "stiffness_N_m"),
+    [
+        ({NOTHING: (1000.0, 900.0), DAMPING: (1600.0, 1300.0)}, DAMPING, 1300.0),
+        ({NOTHING: (1000.0, 900.0), DAMPING: (1600.0, 140.0)}, NOTHING, 900.0),
+        ({NOTHING: (1000.0, 300.0), DAMPING: (1600.0, 140.0), BOTH: (1300.0, 1200.0)}, BOTH, 1200.0),
+    ],
+    ids=["the first choice", "it breaks: none", "it breaks: another"],
+)
+def test_where_the_attack_breaks_the_element_that_bore_most_the_next_is_attacked(walls, family, stiffness_N_m):
+    won = won_of(walls)
+    assert won.best.family is family
+    assert 0.9 * stiffness_N_m < won.bound_N_m < stiffness_N_m
+    assert won.broken
+    assert won.broken[0] >= stiffness_N_m
+
+
+def test_where_nothing_withstands_no_wall_is_advised():
+    assert won_of({NOTHING: (1000.0, 1.0), DAMPING: (1600.0, 1.0)}).bound_N_m == 0.0
+
+
+@settings(max_examples=10)
+@given(borne=st.tuples(*[st.floats(10.0, 1e4)] * 3), share=st.tuples(*[st.floats(0.05, 1.0)] * 3))
+def test_no_element_makes_the_advised_wall_softer_than_it_is_without(borne, share):
+    walls = {f: (k, k * s) for f, k, s in zip(VALUES, borne, share, strict=True)}
+    assert won_of(walls).bound_N_m >= won_of({NOTHING: walls[NOTHING]}).bound_N_m
