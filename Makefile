@@ -78,7 +78,7 @@ docs: $(READY) ## make the documentation as a site in site/ (index.html); a warn
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo 'site/index.html (to search it, too: python3 -m http.server -d site)'
 
-pictures: $(READY) ## make the pictures of README's walk anew (half a minute)
+pictures: $(READY) ## make the pictures of README's walk anew (two minutes)
 	@$(BIN)/python docs/site/pictures.py docs/pictures
 
 notebook: $(READY) ## run docs/notebook.ipynb anew and keep its figures

@@ -12,11 +12,12 @@ from PIL import Image
 # Pixels across, and colours of a palette: a picture then takes some 80 kB.
 WIDTH, COLOURS = 1000, 128
 NO_SWAP = ("--set", "event=[]")
-# By picture: the commands, {} the directory, whose last word on stdout names the figure.
+# By picture: the commands, {} the directory; the last writes figure.png there, or names its figure last on stdout.
 STEPS = {
     "demo": [("demo", "--out", "{}")],
     "buzz": [("run", "demo", *NO_SWAP, "--out", "{}/run"), ("plot", "{}/run")],
     "damping": [("sweep", "demo_damping", "--out", "{}/sweep"), ("plot", "{}/sweep")],
+    "advice": [("advise", "demo", *NO_SWAP, "--out", "{}")],
 }
 
 
@@ -27,7 +28,8 @@ def make(name: str, target: Path) -> None:
         for words in STEPS[name]:
             command = [sys.executable, "-m", "haploop.tools.cli", *(word.format(directory) for word in words)]
             said = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
-        shrink(Path(said.split()[-1]), target / f"{name}.png")
+        figure = Path(directory, "figure.png")
+        shrink(figure if figure.exists() else Path(said.split()[-1]), target / f"{name}.png")
 
 
 def shrink(figure: Path, target: Path) -> None:

@@ -53,6 +53,7 @@ def _walls(ax: Axes, told: Advice, lines: list[str]) -> None:
     for row, best in enumerate(found.bests):
         is_advised = best is found.advised
         safe = found.stiffness_N_m if is_advised else best.safe.stiffness_N_m if best.safe else 0.0
+        safe = min([safe, *(below for fallen, below in found.fell if fallen.family is best.family)])
         labels = ("_", "_") if row else ("as described", "in every corner")
         end = best.nominal.stiffness_N_m
         ax.barh(row, end / 1e3, _BAR, color=style.WALL_FILL, edgecolor=style.WALL, linewidth=0.8, label=labels[0])

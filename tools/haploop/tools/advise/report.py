@@ -85,7 +85,7 @@ def assumes(told: Advice, right: Best) -> str:
 
 def sentences(told: Advice) -> list[str]:
     """Returns headline and answer as lines of text."""
-    return [told.headline, *(f"{name}: {words}." for name, words in answer(told))]
+    return [told.headline, *(f"{name}: {words.rstrip('.')}." for name, words in answer(told))]
 
 
 def describe(failure: Failure) -> str:
