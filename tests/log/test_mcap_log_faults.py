@@ -191,3 +191,27 @@ def test_no_message_is_remembered_once_its_chunk_is_closed(tmp_path: Path) -> No
             tracemalloc.stop()
     # A closed chunk of 71 000 bytes leaves nothing but its index, less than 2 kB.
     assert after - before < 200 * 2000
+
+
+def test_a_log_of_four_times_as_many_chunks_takes_no_more_memory_and_its_summary_lists_them_all(tmp_path: Path) -> None:
+    """Entries of the summary pass what is held in memory, 64 kB, within the first 1000 chunks."""
+    path = tmp_path / "log.mcap"
+    with Log(path, compression="") as log:
+        controller = log.channel("/controller", CONTROLLER, title="Controller")
+
+        def chunks(ticks: range) -> int:
+            for tick in ticks:
+                log.write(controller, np.array([tick]), np.full((1, 3), float(tick)))
+                log.flush()
+            return tracemalloc.get_traced_memory()[0]
+
+        tracemalloc.start()
+        try:
+            before, after = chunks(range(1000)), chunks(range(1000, 4000))
+        finally:
+            tracemalloc.stop()
+    assert after - before < 30_000
+    summary = make_reader(io.BytesIO(path.read_bytes()), validate_crcs=True).get_summary()
+    assert summary
+    assert [index.message_start_time for index in summary.chunk_indexes] == list(range(4000))
+    assert len(streamed(path.read_bytes())) == 4000

@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import contextlib
 import zlib
+from collections.abc import Iterable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import NoReturn
+from tempfile import TemporaryFile
+from typing import IO, NoReturn
 
 from mcap import records as mcap
 from mcap.data_stream import RecordBuilder
@@ -21,6 +24,8 @@ MAGIC = b"\x89MCAP0\r\n"
 # What the header says of the program that wrote the file.
 LIBRARY = "haploop"
 _CRC_BYTES = 4
+# Entries of the summary that are held in memory.
+_HELD_BYTES = 1 << 16
 
 
 class McapFile:
@@ -38,7 +43,10 @@ class McapFile:
         self._crc = 0
         self.schemas: list[mcap.Schema] = []
         self.channels: list[mcap.Channel] = []
-        self._chunk_indexes, self._chunks = bytearray(), 0
+        # Some 130 bytes a chunk, which would be all that grows with a log: many are held in a nameless file.
+        self._chunk_indexes = bytearray()
+        self._more_indexes: IO[bytes] | None = None
+        self._chunks = 0
         self._times: tuple[int, int] | None = None
         self.attachments: list[mcap.AttachmentIndex] = []
         self.message_counts: dict[int, int] = {}
@@ -53,12 +61,23 @@ class McapFile:
         self.append(MAGIC + bytes_of(mcap.Header(profile="", library=LIBRARY)))
 
     def append_chunk(self, piece: bytes, index: mcap.ChunkIndex) -> None:
-        """Appends a chunk. Its entry of the summary is kept as bytes, some 130 a chunk: all that grows with a log."""
+        """Appends a chunk; raises LogError as ``append`` does."""
         self.append(piece)
-        self._chunk_indexes += bytes_of(index)
+        try:
+            self._hold(bytes_of(index))
+        except OSError as error:
+            self._fail(error)
         self._chunks += 1
         first, last = self._times or (index.message_start_time, 0)
         self._times = min(first, index.message_start_time), max(last, index.message_end_time)
+
+    def _hold(self, index: bytes) -> None:
+        self._chunk_indexes += index
+        if len(self._chunk_indexes) > _HELD_BYTES:
+            if self._more_indexes is None:
+                self._more_indexes = TemporaryFile(dir=self.path.parent)  # noqa: SIM115
+            self._more_indexes.write(self._chunk_indexes)
+            self._chunk_indexes.clear()
 
     def append(self, piece: bytes) -> None:
         """Hands a piece to the operating system.
@@ -66,24 +85,30 @@ class McapFile:
         Raises:
             LogError: it refuses, now or at an earlier piece; the file is cut back to the whole pieces before and stays.
         """
+        self._append([piece])
+
+    def _append(self, parts: Iterable[bytes]) -> None:
+        """Appends one piece that comes in parts."""
         if self._failure:
             raise self._failure
-        rest = memoryview(piece)
+        size, crc = self.size, self._crc
         try:
             # An interrupt may have left part of a piece, or all of it, uncounted behind the last one: write over it.
-            self._file.seek(self.size)
-            while rest:
-                rest = rest[self._file.write(rest) or 0 :]
+            self._file.seek(size)
+            for part in parts:
+                rest = memoryview(part)
+                while rest:
+                    rest = rest[self._file.write(rest) or 0 :]
+                size, crc = size + len(part), zlib.crc32(part, crc)
         except OSError as error:
             self._fail(error)
-        self.size += len(piece)
-        self._crc = zlib.crc32(piece, self._crc)
+        self.size, self._crc = size, crc
 
     def _fail(self, error: OSError) -> NoReturn:
         # A device or a pipe cannot be cut back; it was never a log that could be read again.
         with contextlib.suppress(OSError):
             self._file.truncate(self.size)
-        self._file.close()
+        self.close()
         self._failure = LogError(
             f"Writing the log {self.path} failed after {self.size} bytes ({error.strerror}). "
             f"What was written before that stays and can be read with haploop.logger.read; "
@@ -98,13 +123,45 @@ class McapFile:
 
     def close(self) -> None:
         self._file.close()
+        if self._more_indexes:
+            self._more_indexes.close()
 
     def append_summary(self) -> None:
         """Ends the file, from the DataEnd record on; raises LogError as ``append`` does."""
+        self._append(self._summary())
+
+    def _summary(self) -> Iterator[bytes]:
         data_end = bytes_of(mcap.DataEnd(data_section_crc=self._crc))
-        start = self.size + len(data_end)
+        yield data_end
+        groups: dict[Opcode, Iterable[bytes]] = {
+            Opcode.SCHEMA: [bytes_of(*self.schemas)],
+            Opcode.CHANNEL: [bytes_of(*self.channels)],
+            Opcode.STATISTICS: [bytes_of(self._statistics())],
+            Opcode.CHUNK_INDEX: self._held_indexes(),
+            Opcode.ATTACHMENT_INDEX: [bytes_of(*self.attachments)],
+        }
+        start = end = self.size + len(data_end)
+        crc, offsets = 0, []
+        for opcode, pieces in groups.items():
+            first = end
+            for piece in pieces:
+                end, crc = end + len(piece), zlib.crc32(piece, crc)
+                yield piece
+            if end > first:
+                offsets.append(mcap.SummaryOffset(opcode, first, end - first))
+        # The checksum covers the footer as well, up to the checksum itself.
+        last = bytes_of(*offsets) + bytes_of(mcap.Footer(start, end, summary_crc=0))[:-_CRC_BYTES]
+        yield last + zlib.crc32(last, crc).to_bytes(_CRC_BYTES, "little") + MAGIC
+
+    def _held_indexes(self) -> Iterator[bytes]:
+        if self._more_indexes:
+            self._more_indexes.seek(0)
+            yield from iter(partial(self._more_indexes.read, _HELD_BYTES), b"")
+        yield bytes(self._chunk_indexes)
+
+    def _statistics(self) -> mcap.Statistics:
         first, last = self._times or (0, 0)
-        statistics = mcap.Statistics(
+        return mcap.Statistics(
             attachment_count=len(self.attachments),
             channel_count=len(self.channels),
             channel_message_counts=self.message_counts,
@@ -115,22 +172,6 @@ class McapFile:
             metadata_count=0,
             schema_count=len(self.schemas),
         )
-        groups: dict[Opcode, bytes | bytearray] = {
-            Opcode.SCHEMA: bytes_of(*self.schemas),
-            Opcode.CHANNEL: bytes_of(*self.channels),
-            Opcode.STATISTICS: bytes_of(statistics),
-            Opcode.CHUNK_INDEX: self._chunk_indexes,
-            Opcode.ATTACHMENT_INDEX: bytes_of(*self.attachments),
-        }
-        covered, offsets = b"", []
-        for opcode, group in groups.items():
-            if group:
-                offsets.append(mcap.SummaryOffset(opcode, start + len(covered), len(group)))
-            covered += group
-        # The checksum covers the footer as well, up to the checksum itself.
-        footer = bytes_of(mcap.Footer(start, start + len(covered), summary_crc=0))[:-_CRC_BYTES]
-        covered += bytes_of(*offsets) + footer
-        self.append(data_end + covered + zlib.crc32(covered).to_bytes(_CRC_BYTES, "little") + MAGIC)
 
 
 def bytes_of(*records: mcap.McapRecord) -> bytes:
