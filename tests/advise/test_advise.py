@@ -77,7 +77,10 @@ def test_a_directory_of_something_else_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("right_N_m", "words"),
     [
-        (33_700.0, "Were it right: about 34 N/mm with 12 N s/m of damping. Measure friction.kinetic first"),
+        (
+            33_700.0,
+            "Were it right: about 34 N/mm with 12 N s/m of damping, not attacked. Measure friction.kinetic first",
+        ),
         (17_500.0, "Were it right, the wall would be as stiff within a tenth."),
     ],
 )

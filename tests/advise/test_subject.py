@@ -98,3 +98,17 @@ def test_a_device_that_friction_holds_against_the_hand_is_refused_since_any_wall
     refusal = pytest.raises(InvalidRequest, match=r"Dry friction of .* holds the device against the hand's 1.00 N")
     with refusal if refused else nullcontext():
         make_subject(str(tmp_path / "mine.toml"), None, None, None, [], KINDS)
+
+
+@pytest.mark.parametrize(
+    ("delay", "overrides", "assumed"),
+    [
+        (None, [], ["clock.round_trip_delay"]),
+        ("2 ms", [], []),
+        (None, ["clock.round_trip_delay=2 ms"], []),
+        (None, ["clock.control_rate=2000"], ["clock.round_trip_delay"]),
+    ],
+)
+def test_a_number_that_the_command_gives_is_not_assumed_any_more(delay, overrides, assumed):
+    subject = make_subject("demo", None, delay, None, ["event=[]", *overrides], KINDS)
+    assert [each.key for each in subject.assumed] == assumed

@@ -40,7 +40,7 @@ HOLDS_MORE = (
     "A {0} ({1}), which renders less than its wall, may hold more: {2:.2g} N/mm in the loop as described. It was not "
     "tried in every corner; `haploop compare` tells what it holds."
 )
-FELL = "With {0} it bears {1:.2g} N/mm in every corner at three holds, but not {2:.3g} N/mm at others or under attack."
+FELL = "With {0} it bears {1:.2g} N/mm in every corner at three holds; tried further, it fails from {2:.2g} N/mm on."
 NO_OTHER = "With none of these, at seven parameters each, does the loop as described bear {0:.2g} N/mm: {1}."
 READING = (
     "Every corner: what is uncertain 20 % more or less, what is assumed half or twice, in all combinations, or 32 of "

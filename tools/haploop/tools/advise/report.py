@@ -24,7 +24,7 @@ _NO_CHANGE = "no single change that was tried gains a fifth"
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
 # What is assumed, how much that costs, and what to measure.
 _ASSUMED = "{0}, published nowhere: the wall bears half and twice of {1}. {2}"
-_COSTS = "Were {0} right: about {1} with {2}. {3}"
+_COSTS = "Were {0} right: about {1} with {2}, not attacked. {3}"
 _SAME = "Were {0} right, the wall would be as stiff within a tenth."
 _MEASURE = "Measure {0} first: it moves the wall most."
 

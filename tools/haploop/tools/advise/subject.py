@@ -50,6 +50,7 @@ _MARK = "ASSUMPTION"
 _TABLE = re.compile(r"\[+\s*([\w.]+)\s*\]+")
 _VALUE = re.compile(r"([\w]+)\s*=\s*[^#]*#\s*(.*)")
 # What decides how stiff a wall may be; the hand is tried in its own corners.
+_DELAY = "clock.round_trip_delay"
 _STARTS = ("device.position", "device.velocity")
 _TABLES = ("device", "friction", "encoder", "transmission", "clock")
 
@@ -74,7 +75,7 @@ class Subject:
         scene: resolved; events that change it are taken as done from the start.
         has_task: whether it came with a task of its own; a device alone, without wall and duration, has none.
         notes: what was taken, one sentence each.
-        assumed: numbers of the device that its file assumes.
+        assumed: numbers of the device that its file assumes and the arguments do not give.
     """
 
     name: str
@@ -124,7 +125,9 @@ def make_subject(
     rubs, presses_N = scene.friction, hold_N(make_loop(scene, has_task))
     if rubs and (most_N := max(rubs.kinetic, rubs.breakaway or 0.0)) >= presses_N:
         raise InvalidRequest(_STUCK.format(amount(most_N, "N"), amount(presses_N, "N")))
-    return Subject(path.stem, scene, has_task, tuple(notes), assumptions(path))
+    given = [f"{each.partition('=')[0].strip()}." for each in overrides] + [f"{_DELAY}."] * (delay is not None)
+    assumed = tuple(each for each in assumptions(path) if not f"{each.key}.".startswith(tuple(given)))
+    return Subject(path.stem, scene, has_task, tuple(notes), assumed)
 
 
 def assumptions(path: Path) -> tuple[Assumed, ...]:
