@@ -148,7 +148,7 @@ def _most(device: str, of: OfLoop) -> str:
     (found, tied), alone = best(of), format_stiffness(held(without(of.rows)).value)
     if choice(of).family == NOTHING.name:
         return f"on {device} by no element more than without, {alone}"
-    alike = f"not told from {len(tied)} others" if tied else "and more than by every other"
+    alike = f"not told from {', '.join(row.family for row in tied)}" if tied else "and more than by every other"
     return f"on {device} by {found.family}, {format_stiffness(held(found).value)} against {alone} without, {alike}"
 
 
