@@ -172,7 +172,7 @@ def test_what_the_page_draws_are_the_numbers_of_the_log(running, viewing):
 
 @pytest.mark.slow
 def test_after_the_end_the_page_shows_what_came_of_the_run_and_then_the_next_run(running, viewing):
-    first = running(sets=("duration=1",), pace=("--pace", "2"))
+    first = running(sets=("duration=1",), pace=("--pace", "0.2"))  # it lasts until the page is open
     _, page = viewing()
     expect(page.locator("#phase")).to_have_text("ended", timeout=20_000)
     expect(page.locator("#summary")).to_contain_text("Ended: too short")

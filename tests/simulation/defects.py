@@ -10,7 +10,7 @@ from typing import Any
 import msgpack
 
 from haploop.launch import spec
-from haploop.launch.clock import commands
+from haploop.launch.clock import arguments
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.roster import Roster
 from haploop.launch.clock.server import ClockServer
@@ -194,7 +194,7 @@ DEFECTS: dict[str, tuple[Any, str, Callable[[Any], Any]]] = {
     "a second lossless node is not waited for": (Roster, "slowest", _not_waited_for),
     "two runs that start at one instant take one directory": (spec, "_claimed", _not_exclusively),
     "blocks from before a STATE are taken": (Subscriber, "_follows", _before_its_state),
-    "one command may carry any number of keys": (commands, "_MOST_VALUES", lambda kept: 10**9),
+    "one command may carry any number of keys": (arguments, "_MOST_VALUES", lambda kept: 10**9),
     "the log keeps objects of every chunk": (McapFile, "append_chunk", _keeps_objects),
 }
 # Those that take too many seeds to find; the histories recorded of them find them.

@@ -36,6 +36,8 @@ class CompiledWindow(Window):
             yield from super().measures(places)
             return
         wanted = np.fromiter(places, np.intp)
+        if not len(wanted):
+            return
         rows = {**self.rings.rows, "wall_position": self.state.rows["wall_position"]}
         found = _look(self.rings.x, rows, np.int64(steps), self.swing_m, steps=span.steps + 1, ticks=span.ticks)
         crossings, growth, width, inside, *means = (np.asarray(column)[wanted].tolist() for column in found)
