@@ -22,13 +22,19 @@ BREAKS = {
 SWAP: dict[str, Any] = {"swap": {"kind": "brake", "damping": 0.05, "acts": "always"}}
 
 
-@pytest.mark.slow
-def test_a_reload_that_breaks_in_any_way_changes_nothing_and_time_goes_on(running, scene, tmp_path):
-    """Neither the element at work, nor its file, nor the kinds at hand, nor one bit of the run."""
+def braked(running, scene, tmp_path):
+    """Returns the file of a plugin and a run, a hundred ticks old, that was started with it."""
     plugin = tmp_path / "brake.py"
     plugin.write_text(source())
     run = running("--plugin", str(plugin), scene=scene)
     run.reaches(100)
+    return plugin, run
+
+
+@pytest.mark.slow
+def test_a_reload_that_breaks_in_any_way_changes_nothing_and_time_goes_on(running, scene, tmp_path):
+    """Neither the element at work, nor its file, nor the kinds at hand, nor one bit of the run."""
+    plugin, run = braked(running, scene, tmp_path)
     kept, options = sorted((run.out / "plugins").iterdir()), run.ask("options")
     for statement, words in BREAKS.items():
         plugin.write_text(source(at_making=statement))
@@ -77,10 +83,7 @@ def test_time_goes_on_while_a_file_is_tried_and_other_commands_are_answered(runn
 def test_undo_brings_back_the_code_before_a_reload_and_one_taken_back_is_told_at_once_with_its_line(
     running, scene, tmp_path
 ):
-    plugin = tmp_path / "brake.py"
-    plugin.write_text(source())
-    run = running("--plugin", str(plugin), scene=scene)
-    run.reaches(100)
+    plugin, run = braked(running, scene, tmp_path)
     plugin.write_text(source().replace("-self", "-2 * self"))
     text, doubled = run_directory.ask(run.live, "swap", **SWAP, reload=True)
     assert "to go back: undo" in text
@@ -102,10 +105,7 @@ def test_undo_brings_back_the_code_before_a_reload_and_one_taken_back_is_told_at
 
 @pytest.mark.slow
 def test_a_reload_that_never_ends_is_answered_and_the_run_ends_as_it_would_have(running, scene, tmp_path):
-    plugin = tmp_path / "brake.py"
-    plugin.write_text(source())
-    run = running("--plugin", str(plugin), scene=scene)
-    run.reaches(100)
+    plugin, run = braked(running, scene, tmp_path)
     plugin.write_text(source(at_force="while True: pass"))
     with pytest.raises(run_directory.CommandRefused, match="10 s were not enough as the element brake was made"):
         run.ask("swap", **SWAP, reload=True)
@@ -115,10 +115,7 @@ def test_a_reload_that_never_ends_is_answered_and_the_run_ends_as_it_would_have(
 
 @pytest.mark.slow
 def test_a_run_that_ends_while_a_file_is_tried_leaves_nothing(running, scene, tmp_path):
-    plugin = tmp_path / "brake.py"
-    plugin.write_text(source())
-    run = running("--plugin", str(plugin), scene=scene)
-    run.reaches(100)
+    plugin, run = braked(running, scene, tmp_path)
     plugin.write_text(source(f"Path({str(tmp_path / 'here')!r}).write_text(str(os.getpid())); time.sleep(1000)"))
 
     def ask() -> None:
