@@ -7,6 +7,7 @@ import importlib.util
 import re
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -80,6 +81,29 @@ def test_every_anchor_that_a_document_links_to_is_in_the_page():
     assert lost == []
 
 
+def test_every_picture_of_readme_and_site_is_a_link_to_its_full_size():
+    pytest.importorskip("mkdocs", reason="the site needs mkdocs: pip install 'haploop[docs]'")
+    place = importlib.util.spec_from_file_location("site_hooks", HOUSE / "docs/site/hooks.py")
+    assert place
+    assert place.loader
+    hooks = importlib.util.module_from_spec(place)
+    place.loader.exec_module(hooks)
+    files = SimpleNamespace(get_file_from_path=lambda path: path if (HOUSE / "docs" / path).exists() else None)
+    seen = 0
+    for name in ("index.md", "viewers.md", "paper_claims.md"):
+        text = (HOUSE / hooks.ELSEWHERE.get(name, f"docs/{name}")).read_text(encoding="utf-8")
+        page = SimpleNamespace(file=SimpleNamespace(src_uri=name))
+        pictures = re.findall(
+            r"(\[?)!\[[^\]]*\]\(([^)]+)\)(?:\]\(([^)]+)\))?", hooks.on_page_markdown(text, page, {}, files)
+        )
+        assert pictures
+        assert [picture for picture in pictures if picture[0] != "[" or picture[1] != picture[2]] == []
+        assert all((HOUSE / "docs" / where).exists() for _, where, _ in pictures)
+        seen += len(pictures)
+    assert seen > 15
+    assert not re.search(r"(?<!\[)!\[", (HOUSE / "README.md").read_text(encoding="utf-8"))
+
+
 @pytest.mark.parametrize("name", ["notebook.ipynb", "plotjuggler_layout.xml", "foxglove_layout.json"])
 def test_a_file_that_the_guides_offer_is_part_of_the_site(name):
     left_out = re.search(r"^exclude_docs: \|\n((?:  .*\n)+)", (HOUSE / "mkdocs.yml").read_text(encoding="utf-8"), re.M)
@@ -141,6 +165,7 @@ def command_lines(text: str) -> list[str]:
     return [line for block in blocks for line in block.replace("\\\n", " ").splitlines() if line.startswith("haploop ")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("document", FOR_USERS, ids=lambda path: path.name)
 def test_every_command_that_a_document_shows_is_one_and_takes_its_options(document: Path) -> None:
     lines = command_lines(document.read_text(encoding="utf-8"))

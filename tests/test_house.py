@@ -51,6 +51,7 @@ def test_the_arrows_between_the_packages_only_go_down() -> None:
     assert report.returncode == 0, report.stdout + report.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("importer", "imported"),
     [

@@ -22,6 +22,7 @@ def words(cells: list[dict[str, Any]]) -> list[Any]:
     return [output.get("text") or output["data"].get("text/plain") for output in outputs]
 
 
+@pytest.mark.slow
 def test_every_cell_runs_and_says_what_the_notebook_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("matplotlib")
     monkeypatch.chdir(FILE.parent)

@@ -85,6 +85,7 @@ def ran(path: Path, text: str, *options: str) -> tuple[dict[str, Any], Any]:
     return json.loads(done.stdout), haploop.logger.read(path / "run")
 
 
+@pytest.mark.slow
 def test_a_scene_that_names_them_is_checked_with_units_bounds_and_rules_of_their_own(scene: Path) -> None:
     done = outside("check", scene, "--json")
     assert done.returncode == 0, done.stderr
@@ -124,6 +125,7 @@ def test_the_schema_for_editors_has_their_keys() -> None:
     assert "kutta-3-8" in schema["$defs"]["Clock"]["properties"]["integrator"]["enum"]
 
 
+@pytest.mark.slow
 def test_the_plan_and_explain_say_what_they_do_and_cost(scene: Path) -> None:
     told = json.loads(outside("explain", "--cost", scene, "--json").stdout)
     effects = {effect["name"]: effect for effect in told["effects"]}
@@ -185,6 +187,7 @@ def test_the_residual_stays_below_the_last_bits_also_for_bodies_in_a_row(tmp_pat
         assert summary["energy"]["gravity_work_J"] > 1e-3
 
 
+@pytest.mark.slow
 def test_processes_find_them_too_and_have_the_same_bits(tmp_path: Path) -> None:
     (one, _), (many, _) = ran(tmp_path / "one", ALL, "--in-process"), ran(tmp_path / "many", ALL)
     assert one["trajectory_sha256"] == many["trajectory_sha256"]

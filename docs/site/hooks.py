@@ -29,6 +29,7 @@ ELSEWHERE = {
 # What README says of the site, and what the site says in its place.
 _MADE = "`make docs`, which makes these pages a site, with a reference that is generated from the code"
 _HERE = ", ".join(f"[{page}](docs/reference/{page}.md)" for page in ("scene", "commands", "summary", "log", "api"))
+_PICTURE = re.compile(r"(?<!\[)(!\[[^\]]*\]\(([^)\s]+)\))")
 _LINK = re.compile(r"(!?)\[((?:[^\]\[]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 
 
@@ -42,13 +43,14 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
-    """Returns the page with its links leading to pages of the site."""
+    """Returns the page with its links leading to pages of the site, and every picture a link to its full size."""
     here = page.file.src_uri
     folder = posixpath.dirname(ELSEWHERE.get(here, f"docs/{here}"))
     pages = {path: name for name, path in ELSEWHERE.items()}
 
     def led(match: re.Match[str]) -> str:
         picture, text, link = match.groups()
+        text = _LINK.sub(led, text)
         target, _, anchor = link.partition("#")
         if "://" in link or not target:
             return match[0]
@@ -66,4 +68,5 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
             raise ValueError(f"README.md no longer says {_MADE!r}, in whose place the site names its reference.")
         markdown = markdown.replace(_MADE, f"the reference: {_HERE}")
     parts = re.split(r"(^```.*?^```$)", markdown, flags=re.MULTILINE | re.DOTALL)
-    return "".join(part if part.startswith("```") else _LINK.sub(led, part) for part in parts)
+    linked = (part if part.startswith("```") else _LINK.sub(led, _PICTURE.sub(r"[\1](\2)", part)) for part in parts)
+    return "".join(linked)

@@ -107,7 +107,8 @@ def _keys(properties: Mapping[str, Any], tables: Mapping[str, Any]) -> str:
             about = _plain(one.get("description") or _choices(one))
         default = json.dumps(one["default"]) if one.get("default") is not None else ""
         rows.append((f"`{key}`", about, f"`{default}`" if default else "–"))
-    return markdown_table(("key", "what it is", "unless given"), rows) if rows else ""
+    table = markdown_table(("key", "what it is", "unless given"), rows)
+    return f'<div class="keys" markdown>\n\n{table}\n\n</div>' if rows else ""  # on a phone a key above its words
 
 
 def _choices(one: Mapping[str, Any]) -> str:

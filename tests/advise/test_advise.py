@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.file import load
+from haploop.launch.stability.judge import judge_scene
 from haploop.protocol.scene.paths import value_at
 from haploop.tools.advise.advice import is_ideal
 from haploop.tools.advise.families import DAMPING
@@ -18,6 +19,7 @@ from haploop.tools.advise.subject import Assumed
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.withstand import Best, rounded_down
 from haploop.tools.cli.app import app
+from helpers.scenes.least import KINDS
 from helpers.scenes.presets import loop_of
 
 
@@ -50,18 +52,22 @@ def test_a_safe_stiffness_is_rounded_down(value, down):
 
 
 @pytest.mark.slow
-def test_an_advice_says_first_that_it_is_an_upper_bound_goes_on_when_stopped_and_leaves_a_scene_that_runs(tmp_path):
+def test_an_advice_says_first_that_it_is_an_upper_bound_goes_on_when_stopped_and_leaves_scenes_that_rest_and_swing(
+    tmp_path,
+):
     out = tmp_path / "a"
-    asked = ["advise", "touch", "--workers", "1", "--out", str(out), "--json"]
+    asked = ["advise", "premium15", "--workers", "1", "--out", str(out), "--json"]
     done = CliRunner().invoke(app, asked)
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout.splitlines()[-1])
-    assert found["headline"].startswith("Upper bound, not advice: touch is taken as rigid")
+    assert found["headline"].startswith("Upper bound, not advice: premium15 is taken as rigid")
     lines = (out / "walls.jsonl").read_text().splitlines()
     advised = load(out / "advice.toml")
     assert value_at(advised, "wall.stiffness") == found["recommended"]["stiffness_N_m"]
     assert (out / "figure.png").stat().st_size > 10_000
-    (out / "walls.jsonl").write_text("\n".join(lines[: len(lines) // 2]) + '\n["torn')
+    assert judge_scene(advised, KINDS).word == "steady"
+    assert judge_scene(load(out / "advice_breaks.toml"), KINDS).word in ("limit-cycle", "growing", "diverged")
+    (out / "walls.jsonl").write_text("\n".join(lines[: len(lines) * 9 // 10]) + '\n{"torn')
     again = json.loads(CliRunner().invoke(app, asked).stdout.splitlines()[-1])
     assert 0 < again.pop("runs") < found.pop("runs")
     assert again == found
@@ -92,4 +98,5 @@ def test_what_is_assumed_stands_in_the_answer_with_what_the_wall_would_be_were_i
         found=SimpleNamespace(stiffness_N_m=17_000.0),
     )  # fmt: skip
     found = assumes(told, right)
-    assert found.startswith("friction.kinetic, published nowhere: the wall bears half and twice of it. " + words)
+    lead = "friction.kinetic, neither measured nor published: the wall bears half and twice of it. "
+    assert found.startswith(lead + words)

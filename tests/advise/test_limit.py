@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from haploop.tools.advise.walls.limit import LEAST_N_M, MOST_N_M, Query, ladder, limits
-from haploop.tools.advise.walls.trial import Failure
+from haploop.tools.advise.walls.store import Failure
 
 TOLERANCE = 0.05
 FAILS = Failure("a case", 1.0, gone=False)

@@ -13,7 +13,8 @@ from haploop.tools.advise.families import (
 from haploop.tools.advise.others import hiding, others_bearing, worth_more
 from haploop.tools.advise.walls.limit import Limit, Query
 from haploop.tools.advise.walls.rendered import Rendered, Trying
-from haploop.tools.advise.walls.trial import Failure, Store, Trial
+from haploop.tools.advise.walls.store import Failure, Store
+from haploop.tools.advise.walls.trial import Trial
 from helpers.scenes.presets import loop_of
 
 

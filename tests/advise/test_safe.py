@@ -10,7 +10,8 @@ from haploop.tools.advise.known import formulas
 from haploop.tools.advise.search import Found, search
 from haploop.tools.advise.subject import assumptions
 from haploop.tools.advise.walls.cases import hold_N
-from haploop.tools.advise.walls.trial import Store, Trial
+from haploop.tools.advise.walls.store import Store
+from haploop.tools.advise.walls.trial import Trial
 from helpers.scenes.presets import loop_of
 from oracles.held_wall import ASSUMED, DEVICES, LASTS_S, buzzes, columns, in_corners, press
 
@@ -54,8 +55,8 @@ def test_the_advised_wall_is_unfelt_in_every_corner_of_independent_loops_and_non
     loop = loop_of(device)
     with Trial(Store(), workers=1) as trial:
         found, held = search(loop, [of.key for of in assumptions(bundled("devices")[device])], trial), hold_N(loop)
-    assert found.stiffness_N_m
-    assert safe(device, held, np.array([found.stiffness_N_m]), sizes_of(found), most=64).all()
+    assert found.stiffness_N_m >= found.alone_N_m > 0.0
+    assert safe(device, held, np.array([found.stiffness_N_m]), sizes_of(found), most=32).all()
     of = DEVICES[device]
     moved = of.mass + of.motor_mass
     largest = np.array([moved / 5e-4, moved, moved])  # beyond, the element alone makes the device unstable
@@ -64,7 +65,7 @@ def test_the_advised_wall_is_unfelt_in_every_corner_of_independent_loops_and_non
     choices += [largest * (b, 0.0, m) for b, m in product(shares[2::2], shares[3::2])]
     advised_sizes = sizes_of(found)[0]
     choices += [advised_sizes * factor for factor in (0.7, 0.84, 1.0, 1.19, 1.41)]
-    stiffness = found.stiffness_N_m * 1.1 * 1.04 ** np.arange(4.0)
+    stiffness = found.stiffness_N_m * 1.1 * 1.06 ** np.arange(2.0)
     walls = list(product(stiffness, choices))
     for corners in (16, 64):  # few first; what passes there is met as the advised wall is
         left = np.array([k for k, _ in walls]), np.array([each for _, each in walls]).reshape(-1, len(KIND))

@@ -12,9 +12,11 @@ from haploop.plant.friction import projected
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.advise.report import describe
-from haploop.tools.advise.walls.cases import HOLDS, Case, corner, make_loop, ranges
+from haploop.tools.advise.walls.cases import HOLDS, Case, make_loop
+from haploop.tools.advise.walls.corners import corner, ranges
 from haploop.tools.advise.walls.loops import LoneLoop, Loops, make_loops
-from haploop.tools.advise.walls.trial import Job, Store, Trial, Tried
+from haploop.tools.advise.walls.store import Job, Store, Tried
+from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.linear.one_tick import OneTickMap
 from helpers.scenes.least import KINDS, scene
 from helpers.scenes.presets import loop_of
@@ -92,6 +94,7 @@ def test_members_may_differ_in_bodies_friction_holds_walls_and_gains_and_be_one_
         assert np.allclose(Loops([one], KINDS).go_on(200).x[:, 0], together.x[:, place], rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_a_loop_with_jitter_runs_by_itself_and_is_judged_all_the_same():
     loop = loop_of("premium15_cable", "jitter.kind=uniform", "jitter.most=0.001")
     with Trial(Store()) as trial:
@@ -144,6 +147,7 @@ def test_the_hands_share_of_a_corner_reaches_the_bodies():
     assert Chain.from_scene(changed).masses_kg[-1] == pytest.approx(0.8 * 0.269)
 
 
+@pytest.mark.slow
 def test_loops_of_other_bodies_and_friction_are_tried_in_one_array_each_by_its_own_threshold():
     loop = loop_of("premium15")
     others = [with_value(loop, "friction.kinetic", 0.024), with_value(loop, "encoder.resolution", 57.4e-6)]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from haploop.tools.advise.families import BOTH, DAMPING, NOTHING, Family
 from haploop.tools.advise.walls.limit import Limit
-from haploop.tools.advise.walls.trial import Failure
+from haploop.tools.advise.walls.store import Failure
 from haploop.tools.advise.withstand import Best, rivals, withstand
 from helpers.scenes.presets import loop_of
 

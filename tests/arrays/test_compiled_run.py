@@ -94,6 +94,7 @@ def test_workers_share_the_memory_of_a_gpu_unless_the_user_says_otherwise(
     assert dict(os.environ) == before
 
 
+@pytest.mark.slow
 def test_what_is_not_asked_for_is_left_out() -> None:
     scenes = many(16)
     for result, whole in zip(compiled(scenes, energy=False), compiled(scenes), strict=True):
@@ -158,6 +159,7 @@ def test_walls_that_are_no_springs_compile_with_the_books_of_what_their_law_take
     assert compiling()[0] > count
 
 
+@pytest.mark.slow
 def test_bodies_in_a_row_go_their_own_way_to_the_same_bits() -> None:
     scenes = many(2, friction={"kinetic": 0.01}, hand=PUSH)
     assert compiled(scenes) == run_batch(scenes, KINDS)

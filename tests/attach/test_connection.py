@@ -59,6 +59,7 @@ def why(address: str, keys: Path | None) -> str:
     return str(found.value)
 
 
+@pytest.mark.slow
 def test_a_key_that_the_run_does_not_know_is_told_so(keys, tmp_path):
     make_keys(tmp_path / "mine")
     (tmp_path / "mine/clock.key").write_bytes((keys / "clock.key").read_bytes())
@@ -66,11 +67,13 @@ def test_a_key_that_the_run_does_not_know_is_told_so(keys, tmp_path):
         assert "refuses this key" in why(address, tmp_path / "mine")
 
 
+@pytest.mark.slow
 def test_whoever_comes_without_keys_is_told_that_the_run_has_some(keys):
     with listening(keys) as address:
         assert "is guarded by keys" in why(address, None)
 
 
+@pytest.mark.slow
 def test_whoever_is_turned_away_before_a_first_word_can_be_said_is_told_why_and_does_not_wait_for_ever(
     keys, monkeypatch
 ):
@@ -87,6 +90,7 @@ def test_whoever_is_turned_away_before_a_first_word_can_be_said_is_told_why_and_
         assert "is guarded by keys" in why(address, None)
 
 
+@pytest.mark.slow
 def test_whoever_comes_with_keys_to_a_run_without_is_told_so(keys):
     with listening(None) as address:
         assert "has no keys" in why(address, keys)

@@ -65,6 +65,7 @@ def test_after_a_change_of_pace_time_goes_on_from_where_it_was_at_the_new_pace()
     assert granted(subject, 300, now=5.011) == 700  # the window
 
 
+@pytest.mark.slow
 def test_a_run_takes_pace_and_delay_while_it_goes_records_them_and_replays_to_the_same_bits(tmp_path):
     with going(tmp_path, "duration=600", pauses=(500,)) as subject:
         subject.stands_at(500)

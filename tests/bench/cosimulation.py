@@ -1,8 +1,9 @@
 """The exchange of a tick by co-simulation frameworks: a sample one way, a force back, with nothing computed.
 
 usage: python tests/bench/cosimulation.py [TICKS]. HELICS (core zmq) and mosaik (simulators over TCP), their two sides
-processes pinned as plant and controller of a run are, beside the bare ping-pong and haploop's run without delay, ten
-times as long, which computes, books and logs as well. What is not installed is left out, with a word.
+processes pinned as plant and controller of a run are, beside the bare ping-pong and haploop's run, which computes,
+books and logs as well; without delay, and with delay that is lookahead where a framework has that (HELICS: its output
+delay). What is not installed is left out, with a word.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 
 from rich.console import Console
 from rich.table import Table
@@ -24,10 +26,16 @@ from haploop.launch.processes.children import share_cores
 from haploop.tools.machine import machine
 
 REPEATS, PERIOD_S = 3, 1e-3
+# haploop's runs are so many times as long: their start takes as much processor time as thousands of ticks.
+LONGER = 30
 
 
-def helics_federate(role: str, ticks: int) -> None:
-    """One side: the plant publishes at every tick, the controller answers half a tick later."""
+def helics_federate(role: str, ticks: int, one_way: int) -> None:
+    """One side: the plant publishes at every tick, the controller answers half a tick later, or after a delay.
+
+    Args:
+        one_way: delay of either way in ticks; 0: an answer within the tick.
+    """
     import helics as h  # pyright: ignore[reportMissingImports]
 
     broker = h.helicsCreateBroker("zmq", "", "-f 2") if role == "plant" else None
@@ -35,7 +43,9 @@ def helics_federate(role: str, ticks: int) -> None:
     h.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
     h.helicsFederateInfoSetCoreInitString(info, "--federates=1")
     h.helicsFederateInfoSetTimeProperty(info, h.HELICS_PROPERTY_TIME_PERIOD, PERIOD_S)
-    if role == "controller":
+    if one_way:
+        h.helicsFederateInfoSetTimeProperty(info, h.HELICS_PROPERTY_TIME_OUTPUT_DELAY, (one_way - 1e-6) * PERIOD_S)
+    elif role == "controller":
         h.helicsFederateInfoSetTimeProperty(info, h.HELICS_PROPERTY_TIME_OFFSET, PERIOD_S / 2)
     federate = h.helicsCreateValueFederate(role, info)
     other = {"plant": "controller", "controller": "plant"}[role]
@@ -49,11 +59,12 @@ def helics_federate(role: str, ticks: int) -> None:
             h.helicsFederateRequestTime(federate, (tick + 1) * PERIOD_S)
             value = h.helicsInputGetDouble(heard)
         else:
-            h.helicsFederateRequestTime(federate, (tick + 0.5) * PERIOD_S)
+            h.helicsFederateRequestTime(federate, (tick + (1 if one_way else 0.5)) * PERIOD_S)
             h.helicsPublicationPublishDouble(said, h.helicsInputGetDouble(heard))
     took = time.perf_counter() - began
     if role == "plant":
-        assert value == ticks - 0.5, f"the last force answered {value}"
+        answered = ticks - max(1, 2 * one_way) + 0.5
+        assert value == answered, f"the last force answered {value}, not {answered}"
         print(took / ticks * 1e6)
     h.helicsFederateDestroy(federate)
     if broker:
@@ -61,15 +72,17 @@ def helics_federate(role: str, ticks: int) -> None:
         h.helicsCloseLibrary()
 
 
-def helics_us(ticks: int) -> float:
+def helics_us(ticks: int, one_way: int = 0) -> float:
     sides = [
-        subprocess.Popen([sys.executable, __file__, "helics", role, str(ticks)], stdout=subprocess.PIPE, text=True)
+        subprocess.Popen(
+            [sys.executable, __file__, "helics", role, str(ticks), str(one_way)], stdout=subprocess.PIPE, text=True
+        )
         for role in ("plant", "controller")
     ]
     for side in sides:
         _pin(side.pid)
     said = [side.communicate(timeout=300)[0] for side in sides]
-    return float(said[0].split()[-1])
+    return float(said[0].split()[0])
 
 
 def mosaik_simulator(address: str) -> None:
@@ -123,7 +136,14 @@ def _pin(pid: int) -> None:
         os.sched_setaffinity(pid, cores)
 
 
-FRAMEWORKS: dict[str, Callable[[int], float]] = {"helics": helics_us, "mosaik": mosaik_us}
+FRAMEWORKS: dict[str, dict[str, Callable[[int], float]]] = {
+    "helics": {
+        "HELICS, no delay": helics_us,
+        "HELICS, 2 ms of delay": partial(helics_us, one_way=1),
+        "HELICS, 10 ms of delay": partial(helics_us, one_way=5),
+    },
+    "mosaik": {"mosaik, no delay": mosaik_us},
+}
 
 
 def used_s() -> float:
@@ -143,36 +163,37 @@ def measured(by: Callable[[int], float], ticks: int) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Measure in turn, repeat, print medians and ratios."""
+    """Measures in turn, repeats, prints medians and ratios to haploop's run with the same delay."""
     ticks = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    rows: dict[str, Callable[[int], float]] = {
-        "ping-pong": lambda count: ping_pong_us(10 * count),
-        "haploop, no delay": lambda count: loop_us(0.0, "steps", 10 * count * PERIOD_S)(),
-    }
-    for name, measure in FRAMEWORKS.items():
+    own = {"no delay": 0.0, "2 ms of delay": 2e-3, "10 ms of delay": 1e-2}
+    rows: dict[str, Callable[[int], float]] = {"ping-pong": lambda count: ping_pong_us(LONGER * count)}
+    for delay, delay_s in own.items():
+        rows[f"haploop, {delay}"] = lambda count, of=delay_s: loop_us(of, "steps", LONGER * count * PERIOD_S)()
+    for name, measures in FRAMEWORKS.items():
         if importlib.util.find_spec(name):
-            rows[name] = measure
+            rows |= measures
         else:
             print(f"Left out, since it is not installed: {name}.")
     seen: dict[str, list[tuple[float, float]]] = {name: [] for name in rows}
     for _ in range(REPEATS):
         for name, by in rows.items():
             clock_us, used_us = measured(by, ticks)
-            seen[name].append((clock_us, used_us if name in FRAMEWORKS else used_us / 10))
+            seen[name].append((clock_us, used_us / LONGER if name.startswith(("ping", "haploop")) else used_us))
     medians = {name: [statistics.median(of) for of in zip(*values, strict=True)] for name, values in seen.items()}
     table = Table(title=f"medians of {REPEATS} interleaved repeats; {machine()}", title_justify="left")
-    for heading in ("a tick by", "µs on the clock", "/ haploop's", "µs of processors", "/ haploop's"):
+    for heading in ("a tick by", "µs on the clock", "× haploop", "µs of processors", "× haploop"):
         table.add_column(heading)
     for name, row in medians.items():
-        ratios = [value / own for value, own in zip(row, medians["haploop, no delay"], strict=True)]
+        delay = name.partition(", ")[2] or "no delay"
+        ratios = [value / ours for value, ours in zip(row, medians[f"haploop, {delay}"], strict=True)]
         table.add_row(name, f"{row[0]:.3g}", f"{ratios[0]:.2f}", f"{row[1]:.3g}", f"{ratios[1]:.2f}")
     Console(width=100).print(table)
 
 
 if __name__ == "__main__":
     match sys.argv[1:]:
-        case ["helics", role, count]:
-            helics_federate(role, int(count))
+        case ["helics", role, count, one_way]:
+            helics_federate(role, int(count), int(one_way))
         case ["mosaik", "world", count]:
             mosaik_world(int(count))
         case ["mosaik", address, *_]:

@@ -1,4 +1,4 @@
-"""Cost of the live page: share of a core and bytes a second of its server, and what a run loses beside a reader."""
+"""Cost of the live page: its server's share of a core, what a browser draws, and what a run loses beside a reader."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import asyncio
 import json
 import os
 import re
+import shutil
 import signal
 import statistics
 import subprocess
@@ -75,13 +76,38 @@ async def read(address: str, watch: dict[str, float | None], pid: int = 0, secon
         return "The page was closed."
 
 
-def look(pace: str, seconds: float) -> None:
+def draw(address: str, pid: int, seconds: float) -> None:
+    """Counts the pictures that a headless Chromium draws in each second, of each span of the page."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(
+            executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
+        )
+        page = browser.new_page(viewport={"width": 1280, "height": 720})
+        page.goto(address)
+        for span in ("1", "10", "all"):
+            page.click(f"label:has([name=span][value='{span}'])")
+            time.sleep(2.0)
+            began, used = time.monotonic(), cpu_s(pid)
+            drawn = []
+            while time.monotonic() < began + seconds:
+                time.sleep(1.02)  # the page counts by the second
+                drawn.append(int(page.inner_text("#rate")))
+            share, real = (cpu_s(pid) - used) / (time.monotonic() - began), page.inner_text("#factor")
+            print(f"{span:>5}: {min(drawn)} to {max(drawn)} pictures a second, server {share:.3f} of a core, {real}")
+        browser.close()
+
+
+def look(pace: str, seconds: float, in_browser: bool) -> None:
     """Looks at Fig. 6(c) in each way for a while."""
     with tempfile.TemporaryDirectory(prefix="hl", dir="/tmp") as folder:
         served, address = viewer(folder)
         going = run(folder, f"{folder}/out", 600.0 if pace != "free" else 60_000.0, pace)
         try:
             time.sleep(12.0)
+            if in_browser:
+                return draw(address, served.pid, seconds)
             for name, watch in WATCHES.items():
                 print(f"{name:<40}{asyncio.run(read(address, watch, served.pid, seconds))}")
         finally:
@@ -124,6 +150,7 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--pace", default="1")
     parser.add_argument("--pairs", type=int, default=0, help="compare so many pairs of runs instead")
+    parser.add_argument("--browser", action="store_true", help="count what a headless Chromium draws instead")
     parser.add_argument("--read", help=argparse.SUPPRESS)
     chosen = parser.parse_args()
     if chosen.read:
@@ -133,7 +160,7 @@ def main() -> None:
     if chosen.pairs:
         pairs(chosen.pairs)
     else:
-        look(chosen.pace, chosen.seconds)
+        look(chosen.pace, chosen.seconds, chosen.browser)
 
 
 if __name__ == "__main__":

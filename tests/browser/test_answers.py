@@ -7,6 +7,7 @@ from helpers.live.stand_in import ENDED, RUNNING, SUMMARY, WAITING
 from oracles.snapshots import contact
 
 
+@pytest.mark.slow
 def test_without_a_run_it_says_how_to_start_one_and_offers_nothing_that_steers(stand_in, open_page):
     stand_in.tell(WAITING)
     page = open_page(stand_in.url)
@@ -19,6 +20,7 @@ def test_without_a_run_it_says_how_to_start_one_and_offers_nothing_that_steers(s
     assert "null" not in page.inner_text("body")
 
 
+@pytest.mark.slow
 def test_a_verdict_is_a_word_a_shape_of_its_own_and_a_colour(stand_in, open_page):
     page = open_page(stand_in.url)
     grounds = set()
@@ -65,6 +67,10 @@ def test_what_the_window_sees_is_an_outline_and_says_that_nothing_is_known_of_st
         stand_in.state(**ENDED | {"verdict": "steady", "sight": sight | {"word": word}})
         expect(page.locator("#verdict span")).to_have_text("steady")
         expect(page.locator("#seen")).to_have_text(told)
+    failed = {"verdict": "undecided", "ended": "failed", "trajectory_sha256": "cd" * 32, "stability": {}}
+    stand_in.state(**ENDED | {"phase": "failed", "verdict": "undecided", "summary": SUMMARY | failed})
+    expect(page.locator("#verdict span")).to_have_text("undecided")
+    expect(page.locator("#summary-title")).to_have_text("Failed: undecided")
     stand_in.state(**ENDED | {"summary": None, "verdict_is": "unknown", "why": "Its summary cannot be read."})
     expect(page.locator("#verdict span")).to_have_text("not known")
     expect(page.locator("#notice")).to_contain_text("Its summary cannot be read.")
@@ -87,6 +93,7 @@ def test_the_header_has_the_numbers_with_their_units(stand_in, open_page):
     expect(page.locator("#oscillation")).to_have_text("–")
 
 
+@pytest.mark.slow
 def test_what_a_plant_of_somebody_elses_makes_of_the_energy_is_told_in_words(stand_in, open_page):
     words = "This plant invents 27 % of the energy: 0.00162 J of the 0.006 J that moved came from nowhere."
     made = {"residual_J": 1.62e-3, "moved_J": 6e-3, "balance": words}
@@ -105,6 +112,7 @@ def test_what_a_plant_of_somebody_elses_makes_of_the_energy_is_told_in_words(sta
     expect(page.locator("#summary")).not_to_contain_text("residual")
 
 
+@pytest.mark.slow
 def test_it_shows_who_waits_for_whom_and_what_each_node_skipped(stand_in, open_page):
     stand_in.state()
     page = open_page(stand_in.url)
@@ -116,6 +124,7 @@ def test_it_shows_who_waits_for_whom_and_what_each_node_skipped(stand_in, open_p
     expect(rows).to_have_count(2)
 
 
+@pytest.mark.slow
 def test_after_the_end_it_shows_what_came_of_the_run_and_its_last_snapshot(stand_in, open_page):
     stand_in.state(**ENDED)
     stand_in.show(contact())
@@ -134,6 +143,7 @@ def test_after_the_end_it_shows_what_came_of_the_run_and_its_last_snapshot(stand
     expect(page.locator("#force .legend")).to_contain_text("total")
 
 
+@pytest.mark.slow
 def test_a_failed_run_says_why(stand_in, open_page):
     stand_in.state(phase="failed", why="The plant was killed by SIGKILL.", options=None)
     page = open_page(stand_in.url)
@@ -141,6 +151,7 @@ def test_a_failed_run_says_why(stand_in, open_page):
     expect(page.locator("#notice")).to_contain_text("The plant was killed by SIGKILL.")
 
 
+@pytest.mark.slow
 def test_a_lost_server_is_told_and_taken_up_again_with_the_same_question(stand_in, open_page):
     stand_in.state()
     page = open_page(stand_in.url)

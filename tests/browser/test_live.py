@@ -52,6 +52,7 @@ def events(run: Run) -> list[dict]:
     return [{k: v for k, v in e.items() if k not in ("at", "timestamp")} for e in run.log()["/events"]]
 
 
+@pytest.mark.slow
 def test_a_swap_in_mid_contact_takes_effect_at_its_tick_is_marked_and_stands_in_the_log(running, viewing):
     run = running(sets=STANDS_AT_1000)
     _, page = viewing()

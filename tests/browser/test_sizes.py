@@ -59,6 +59,13 @@ EVENTS = [
     {"tick": 400 + 3 * i, "t_s": 0.4 + 0.003 * i, "text": f"wall.stiffness = {150 + i} N/m", "kind": "set"}
     for i in range(12)
 ]
+# The longest numbers of a header: a slow run at a wall far too stiff.
+EXTREME = {
+    "pace": 0.1, "real_time_factor": 0.0987, "displayed_stiffness_N_m": -5.2e5, "residual_J": 1.2e-16,
+    "wall": {"position": -0.06, "stiffness": 1e6, "into_wall": -1.0}, "tick": 123_456, "end_tick": 600_000,
+    "sight": {**RUNNING["sight"], "word": "not finite", "oscillation_m": 0.98765, "ripple_N": 23_456.0,
+              "force_swing_N": 23_456.0, "frequency_Hz": 4987.6},
+}  # fmt: skip
 
 
 @pytest.fixture(params=first_and_slowly("dark", "light"))
@@ -98,6 +105,11 @@ def test_nothing_covers_anything_and_no_text_is_cut_off(viewport, stand_in, open
     assert page.evaluate(OVERLAPS) == []
     assert page.evaluate(CUT) == []
     assert page.evaluate("document.documentElement.scrollWidth") == viewport["width"], "no scrolling sideways"
+    stand_in.state(**EXTREME)
+    expect(page.locator("#factor")).to_have_text("99 % of 0.1×")
+    assert page.locator("#stiffness").inner_text() in ("", "−0.52 of 1.00 MN/m")
+    assert page.evaluate(OVERLAPS) == []
+    assert page.evaluate(CUT) == []
     stand_in.state(**ENDED)
     expect(page.locator("#phase")).to_have_text("ended")
     assert page.evaluate(CUT) == []
@@ -181,12 +193,15 @@ def test_every_control_has_a_name(stand_in, open_page):
 
 
 @pytest.mark.slow
-def test_on_a_phone_pause_is_in_sight_wherever_one_reads_and_the_swap_one_tap_away(stand_in, open_page):
+def test_on_a_phone_what_steers_is_in_sight_wherever_one_reads_and_the_swap_one_tap_away(stand_in, open_page):
     page = shown(stand_in, open_page, PHONE, "light", has_touch=True, is_mobile=True)
     for down in (0, 1000, 100_000):
         page.evaluate("down => scrollTo(0, down)", down)
         expect(page.locator("#pause")).to_be_in_viewport(ratio=1)
     page.evaluate("scrollTo(0, 0)")
+    for selector in ("#stop", "[data-step='100']", "[name=pace] + span", "[name=span] + span", "#freeze", "#run"):
+        for control in page.locator(selector).all():
+            expect(control).to_be_in_viewport(ratio=1)
     page.tap("#to-forms")
     expect(page.locator("#swap-do")).to_be_in_viewport()
     assert "token" in page.url

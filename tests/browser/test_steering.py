@@ -13,6 +13,7 @@ def test_every_order_carries_the_token_of_the_link(stand_in, page):
     assert stand_in.commands()[-1]["token"] == TOKEN
 
 
+@pytest.mark.slow
 def test_without_the_token_the_page_watches_says_why_and_orders_nothing(stand_in, open_page):
     stand_in.state()
     page = open_page(stand_in.origin + "/")
@@ -161,6 +162,7 @@ def test_an_order_whose_answer_never_comes_is_told(stand_in, page):
     expect(page.locator("#said")).to_contain_text("lost before the answer came")
 
 
+@pytest.mark.slow
 def test_spans_freezing_and_scrolling_ask_for_that_stretch_of_time(stand_in, page):
     stand_in.show(contact(1.0, 3.0))
     expect(page.locator("#force .legend")).to_contain_text("total")

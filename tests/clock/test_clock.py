@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 
 from haploop.launch.clock.clock import MOST_GRANTS, Clock, ClockError
 from haploop.launch.scene.mistakes import SceneError
+from haploop.protocol.scene.scene import Run
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.transport.wire import MAX_FRAME_BYTES
 from helpers.runs.clocks import DAMPING, SWAP, TICKS, WINDOW, clock, granted, sent
 from helpers.scenes.least import KINDS, scene
 
@@ -24,6 +26,15 @@ def test_the_grant_stays_within_the_window_beyond_the_slowest_node_and_ends_with
 
 def test_the_window_is_that_of_the_scene() -> None:
     assert granted(clock(run={"block_ticks": 7, "window_blocks": 3}), 0) == 21
+
+
+def test_the_window_and_a_block_hold_only_so_many_steps_however_fast_the_plant() -> None:
+    fast = {"plant_rate": 10_000_000, "control_rate": 1000}
+    assert granted(clock(run={"block_ticks": 1000, "window_blocks": 2}, clock=fast), 0) == 12
+    for n in (1, 10, 65, 66, 10_000):
+        length = Timebase(n, 1, 0, 1).block_ticks(Run(block_ticks=10**6))
+        assert 1 <= length <= 65_536 / n
+        assert 8 * 20 * length * n < MAX_FRAME_BYTES, "twenty columns fit in what a socket takes"
 
 
 COMMANDS = st.one_of(

@@ -191,6 +191,7 @@ def test_page_and_figures_are_written_side_by_side(cost: Cost, tmp_path: Path) -
     assert {path.name for path in target.parent.iterdir()} == {"accuracy.md", *linked}
 
 
+@pytest.mark.slow
 def test_without_measurements_the_command_says_what_to_run(tmp_path: Path) -> None:
     with pytest.raises(CostFileError, match="Run haploop cost"):
         write(tmp_path, tmp_path / "docs")

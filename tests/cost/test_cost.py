@@ -35,6 +35,7 @@ def test_exact_is_at_rounding_and_every_other_method_is_ordered_behind_it(smooth
     assert rms["implicit-midpoint"] < rms["euler"]
 
 
+@pytest.mark.slow
 def test_swings_are_compared_where_positions_cannot_be(smooth):
     """A free oscillation: exact has its amplitude, frequency and losses; Euler swings wider and dissipates less."""
     smooth.write_text(

@@ -18,6 +18,7 @@ from helpers.data.costs import fake_cost
 from helpers.scenes.cost_scene import SMOOTH, count_stages, exact_reference
 
 
+@pytest.mark.slow
 def test_a_finished_measurement_is_not_made_again(smooth, tmp_path, monkeypatch):
     grids = [grid(smooth, ["exact", "rk4"], [5_000, 10_000])]
     first, again = {}, {}
@@ -35,6 +36,7 @@ def test_a_finished_measurement_is_not_made_again(smooth, tmp_path, monkeypatch)
     assert costs.scenes[0].advice.startswith("Cheapest within 1.00 µm of the reference: ")
 
 
+@pytest.mark.slow
 def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth, tmp_path, monkeypatch):
     grids = [grid(smooth, ["exact", "rk4"], [5_000])]
     timed = []
@@ -65,6 +67,7 @@ def test_what_was_stopped_goes_on_where_it_was_and_gives_a_cost_meanwhile(smooth
     assert [timed.count(clock) for clock in set(timed)] == [3, 3, 3]
 
 
+@pytest.mark.slow
 def test_every_round_times_every_candidate_once_in_an_order_of_its_own(smooth, tmp_path, monkeypatch):
     order = []
     plain = times.yardstick()
@@ -123,6 +126,7 @@ def test_a_store_passes_over_what_was_cut_off_and_what_is_no_record(tmp_path):
     assert store.all("us", "a", 2) == [1.0]
 
 
+@pytest.mark.slow
 def test_a_failure_has_a_time_and_a_refusal_has_none(smooth, tmp_path):
     """It is let go on far beyond where it failed; one that the check refuses has no time."""
     smooth.write_text(SMOOTH.replace("stiffness = 400.0", "stiffness = 400000.0"))
@@ -142,6 +146,7 @@ def test_errors_do_not_depend_on_the_machine_and_times_do(monkeypatch):
     assert grid_module.times_made_with() != before[1]
 
 
+@pytest.mark.slow
 def test_each_time_is_over_the_yardstick_before_and_after_it(smooth, tmp_path, monkeypatch):
     """On a machine that gets slower all the time, a loop that takes thrice the yardstick still takes thrice."""
     clock = iter(range(10, 10_000))

@@ -126,6 +126,7 @@ def test_stiffness_falls_with_delay_and_grows_with_control_rate(jobs: prices.Job
     assert ten / one == pytest.approx(10.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_without_books_plant_and_controller_do_just_what_they_do_in_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same samples are answered by the same commands, every one of them."""
     made = scene(
@@ -184,6 +185,7 @@ def measuring(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Measuring:
     return Measuring(tmp_path, monkeypatch)
 
 
+@pytest.mark.slow
 def test_all_groups_are_measured_and_a_second_time_nothing_is(measuring: Measuring) -> None:
     groups = measuring.measure()
     assert [group.name for group in groups] == ["books", "log", "effects", "processes", "delay", "control rate"]
@@ -204,6 +206,7 @@ def test_all_groups_are_measured_and_a_second_time_nothing_is(measuring: Measuri
     assert measuring.runs == runs
 
 
+@pytest.mark.slow
 def test_stiffness_that_runs_do_not_confirm_is_told_as_theory(
     measuring: Measuring, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -241,6 +244,7 @@ def records(directory: Path) -> list[tuple[str, str, int]]:
     return [(line["what"], line["key"], line["repeat"]) for line in lines if line["what"] != "quiet"]
 
 
+@pytest.mark.slow
 def test_without_processes_their_prices_are_left_out(measuring: Measuring) -> None:
     assert [group.name for group in measuring.measure(0)] == ["books", "effects", "control rate"]
 

@@ -110,6 +110,7 @@ def test_of_the_chaotic_scene_the_swings_can_be_compared_though_not_the_position
         assert swings[figure] == pytest.approx(reference.statistics[figure], rel=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "ticks"), [("wall_steady", 800), ("wall_limit_cycle", 1000), ("all_effects", 40)])
 def test_fifty_digits_give_the_stored_numbers_again(name, ticks):
     short = accuracy_scene(name, f"duration={ticks / 1000}")

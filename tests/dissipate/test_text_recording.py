@@ -137,15 +137,36 @@ def test_samples_that_repeat_in_mid_motion_are_counted_and_a_device_at_rest_is_n
 
 
 @pytest.mark.parametrize("name", ["t", "time", "Stamp"])
-def test_whole_numbers_of_a_time_without_a_unit_are_asked_after(tmp_path: Path, name: str) -> None:
+def test_times_far_apart_without_a_unit_are_asked_after(tmp_path: Path, name: str) -> None:
     path = write(tmp_path / "ticks.csv", {name: 1001.0 + np.arange(200.0), "x": X})
     layout = Layout(time=name)
-    with pytest.raises(RecordingError, match=r"1001, 1002 and so on, seconds or milliseconds\? Give --time-unit"):
+    with pytest.raises(RecordingError, match=r"1001, 1002 and so on, seconds, milliseconds or microseconds\? Give"):
         outcome(path, layout=layout, dampings=["1.0"])
+    broken_ms = write(tmp_path / "broken_ms.csv", {name: 1001.25 + np.arange(200.0), "x": X})
+    with pytest.raises(RecordingError, match=r"1001\.25, 1002\.25 and so on, seconds, milliseconds"):
+        outcome(broken_ms, layout=layout, dampings=["1.0"])
     given = Layout(time=name, time_unit="ms")
     assert outcome(path, layout=given, dampings=["1.0"]).recording.period_s == pytest.approx(1e-3)
     seconds = write(tmp_path / "seconds.csv", {"time_s": 1001.0 + np.arange(200.0), "x": X})
     assert outcome(seconds, dampings=["1.0"]).recording.period_s == 1.0
+
+
+def test_positions_too_far_apart_for_metres_are_asked_after_unless_a_unit_says_so(tmp_path: Path) -> None:
+    columns = {"t": T, "position": X / np.ptp(X)}
+    path = write(tmp_path / "mm.csv", {**columns, "position": 4.0 * columns["position"]})
+    with pytest.raises(RecordingError, match=r"metres, millimetres or counts\? Give --unit m, mm or metres a count"):
+        outcome(path, dampings=["1.0"])
+    for unit in ("mm", "m", "0.001"):
+        assert not outcome(path, layout=Layout(length=unit), dampings=["1.0"]).recording.notes.remarks
+    doubtful = write(tmp_path / "doubtful.csv", {**columns, "position": 0.5 * columns["position"]})
+    assert any("taken for metres, 0.5 m" in words for words in note_sentences(outcome(doubtful, dampings=["1.0"])))
+    named = write(tmp_path / "named.csv", {"t": T, "x_m": 4.0 * columns["position"]})
+    assert not outcome(named, dampings=["1.0"]).recording.notes.remarks
+
+
+def test_a_mass_that_may_be_in_grams_is_asked_after(plain: Path) -> None:
+    assert any("a mass without a unit is in kg" in words for words in note_sentences(outcome(plain, masses=["1.8"])))
+    assert not any("without a unit" in words for words in note_sentences(outcome(plain, masses=["1.8 g"])))
 
 
 def test_uneven_times_are_counted_and_change_nothing(plain: Path, tmp_path: Path) -> None:
@@ -197,6 +218,7 @@ def broken(tmp_path: Path, text: str | bytes, layout: Layout | None = None) -> s
         ("t,x,a\n0,0,0\n1,1,0\n", Layout(acceleration="a", length="mm"), ["which unit", "--acceleration-unit"]),
         ("t,x,x\n0,0,0\n1,1,1\n", Layout("x"), ["2 columns 'x'", "by its number"]),
         ("t,x\n0,0\n1e-9,1\n2e-9,1\n", None, ["1e-09 s apart", "--time-unit"]),
+        ("t,x\n0,0\n0.001,1e200\n0.002,0\n", None, ["Line 3", "position", "1e+200 in SI units", "give the unit"]),
         (b"\xff\xfet\x00,\x00x\x00\n\x00", None, ["UTF-8"]),
     ],
 )
@@ -231,6 +253,7 @@ def test_whatever_stands_in_a_file_it_is_booked_or_refused(
     assert found.recording.notes.rows >= 2
 
 
+@pytest.mark.slow
 def test_disorder_is_found_wherever_it_is(tmp_path: Path) -> None:
     t = np.arange(40_000) * 1e-3
     t[16_384] = t[16_383]  # the first of a block

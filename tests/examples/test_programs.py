@@ -277,7 +277,7 @@ def test_the_steering_client_says_what_became_of_a_command_and_exits_by_it(tmp_p
 
     done = say("set", json.dumps({"set": {"wall.stiffness": 200}}))
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("wall.stiffness = 200 from tick ")
+    assert done.stdout.startswith("wall.stiffness = 200 N/m from tick ")
     refused = say("set", json.dumps({"set": {"wall.stiffnes": 200}}))
     assert refused.returncode == 1
     assert "did you mean wall.stiffness?" in refused.stdout

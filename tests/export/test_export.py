@@ -53,6 +53,7 @@ def test_csv_has_units_in_its_header_and_every_number_bit_for_bit(run: Path, log
     assert json.loads(event["message"]) == log["/events"][0]
 
 
+@pytest.mark.slow
 def test_csv_is_read_by_pandas_at_once(run: Path, log: Recording, tmp_path: Path) -> None:
     pandas = pytest.importorskip("pandas")
     export(run, "csv", "--out", str(tmp_path), "--topics", "controller,/plant")

@@ -117,6 +117,7 @@ def test_a_logger_that_leaves_by_an_interrupt_has_a_whole_log_and_the_run_goes_o
     assert (its["ended"], its["ticks"], len(log["/controller"]["x"])) == ("stopped", 200, 200)
 
 
+@pytest.mark.slow
 def test_a_logger_that_is_killed_does_not_hold_the_run_up_until_the_deadline(running, attached, alone):
     """Not even when the run is waiting for it already, a window of 4 blocks of 50 ticks ahead."""
     run = running(sets=(*SHORT, NEVER, "run.block_ticks=50", "run.window_blocks=4"))

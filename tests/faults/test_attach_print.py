@@ -28,6 +28,7 @@ def printing(launched):
     return attach
 
 
+@pytest.mark.slow
 def test_a_run_is_printed_to_its_end_with_its_changes_and_final_verdict(running, printing):
     run = running(sets=SHORT, pace=("--pace", "5"))
     run.reaches(500)

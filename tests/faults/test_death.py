@@ -97,6 +97,7 @@ def test_a_node_that_hangs_for_less_than_the_deadline_costs_time_but_not_one_tic
     assert same_bits(run.log(), undisturbed) == summary["ticks"] >= done
 
 
+@pytest.mark.slow
 def test_when_the_launcher_is_killed_the_nodes_end_by_themselves_and_the_next_command_clears_up(running, undisturbed):
     run = running()
     flushed = run.has_logged(200)

@@ -32,6 +32,7 @@ def test_a_disk_that_fills_ends_a_run_in_one_process_with_the_same_error(launche
     assert same_bits(haploop.logger.read(out), undisturbed) >= 1000
 
 
+@pytest.mark.slow
 def test_a_summary_that_cannot_be_written_fails_the_run_and_leaves_no_part_of_one(running, undisturbed):
     run = running()
     run.reaches(200)
@@ -45,6 +46,7 @@ def test_a_summary_that_cannot_be_written_fails_the_run_and_leaves_no_part_of_on
     assert same_bits(haploop.logger.read(run.out), undisturbed) >= 200
 
 
+@pytest.mark.slow
 def test_a_directory_that_is_removed_in_mid_run_fails_the_run_with_a_clear_error(running):
     run = running()
     run.reaches(200)
@@ -56,6 +58,7 @@ def test_a_directory_that_is_removed_in_mid_run_fails_the_run_with_a_clear_error
     assert "Traceback" not in run.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [[], ["--in-process"]])
 def test_a_directory_that_holds_something_is_refused_and_stays_as_it_was(options, launched, tmp_path):
     out = tmp_path / "out"

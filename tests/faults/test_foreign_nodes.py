@@ -17,7 +17,7 @@ import pytest
 from typer.testing import CliRunner
 
 from haploop.launch.processes import private_directory
-from haploop.launch.processes.foreign import ProgramError, check_wait, read_programs
+from haploop.launch.processes.foreign import Program, ProgramError, check_wait, read_programs
 from haploop.launch.processes.run_directory import CommandRefused
 from haploop.logger import read
 from haploop.tools.cli.app import app
@@ -153,6 +153,11 @@ def test_what_cannot_be_a_program_is_refused_before_anything_is_written(
     assert not out.exists()
 
 
+def test_of_a_long_command_the_program_is_named_and_not_its_directories() -> None:
+    words = ("/deep" * 30 + "/python", "-I", "/deep" * 30 + "/mine.py", "--gain", "3")
+    assert Program("controller", shlex.join(words), words).label == "controller (python -I mine.py --gain 3)"
+
+
 def test_a_command_is_split_as_a_shell_splits_it_but_given_to_none() -> None:
     (program,) = read_programs([r'plant=sh -c "a b" $HOME `x` ; "c d"\ e'], []).values()
     assert program.words == ("sh", "-c", "a b", "$HOME", "`x`", ";", "c d e")
@@ -249,6 +254,7 @@ def test_binary_on_stdout_from_the_start_harms_nobody_and_stands_in_the_prints(
     assert "\x1b" not in run.stderr
 
 
+@pytest.mark.slow
 def test_a_change_that_a_foreign_controller_passes_over_is_refused_and_one_it_makes_is_not(started: Started) -> None:
     run = started(node=f"{PLAIN} --changes make", sets=("duration=600",), pace=("--pace", "2"))
     run.reaches(100)

@@ -38,6 +38,7 @@ def test_the_first_signal_ends_a_run_in_order_with_a_summary_of_what_ran(number,
     assert_stopped_in_order(run, summary, undisturbed)
 
 
+@pytest.mark.slow
 def test_the_first_signal_ends_a_paused_run_where_it_stands(running, undisturbed):
     run = running()
     run.reaches(200)
@@ -57,10 +58,11 @@ def test_a_signal_before_the_first_tick_ends_the_run_in_order_at_tick_0(running,
     summary = run.summary()
     run.leaves_nothing()
     assert summary["ticks"] == 0
-    assert summary["verdict"] == "no-contact"
+    assert summary["verdict"] == "undecided"
     assert_stopped_in_order(run, summary, undisturbed)
 
 
+@pytest.mark.slow
 def test_the_second_signal_ends_a_run_at_once_that_the_first_cannot_end(running, undisturbed):
     """The logger hangs and the deadline is far away, so that the order the first signal asks for never comes."""
     run = running()
@@ -77,6 +79,7 @@ def test_the_second_signal_ends_a_run_at_once_that_the_first_cannot_end(running,
     assert same_bits(haploop.logger.read(run.out), undisturbed) >= flushed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", SIGNALS)
 def test_the_first_signal_ends_a_run_in_one_process_in_order_too(number, launched, tmp_path, undisturbed):
     out = tmp_path / "out"

@@ -73,6 +73,7 @@ def test_many_that_start_at_once_without_a_directory_get_one_each(tmp_path):
     assert {words.split()[0] for words in said} == {"got"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("there", [False, True])
 @pytest.mark.parametrize("name", ["scene.toml", "plugins"])
 def test_a_disk_that_is_full_as_the_directory_is_made_leaves_nothing(name, there, tmp_path, monkeypatch):
@@ -107,6 +108,7 @@ def test_a_directory_in_which_not_even_a_file_can_be_made_is_not_left_behind(tmp
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_run_whose_sockets_cannot_be_made_leaves_no_directory(live_runs_here, tmp_path):
     (live_runs_here / "haploop").write_text("a file")
     kept = tmp_path / "kept"

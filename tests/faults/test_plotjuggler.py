@@ -164,6 +164,7 @@ def test_it_waits_for_a_run_survives_its_end_and_goes_on_with_the_next(running, 
     assert "Traceback" not in node.stderr
 
 
+@pytest.mark.slow
 def test_a_run_that_was_named_is_the_only_one_and_its_failure_is_told(running, launched):
     run = running()
     run.reaches(200)

@@ -54,6 +54,7 @@ def test_a_reload_that_breaks_in_any_way_changes_nothing_and_time_goes_on(runnin
     assert replay(run.out).differences == []
 
 
+@pytest.mark.slow
 def test_time_goes_on_while_a_file_is_tried_and_other_commands_are_answered(running, scene, tmp_path):
     """The file waits for another that the test makes when time has gone on; then it is taken up."""
     plugin, flag = tmp_path / "brake.py", tmp_path / "flag"
@@ -80,6 +81,7 @@ def test_time_goes_on_while_a_file_is_tried_and_other_commands_are_answered(runn
     assert (rows["dissipation.0"][tick:] == -0.1 * rows["v"][tick:]).all()
 
 
+@pytest.mark.slow
 def test_undo_brings_back_the_code_before_a_reload_and_one_taken_back_is_told_at_once_with_its_line(
     running, scene, tmp_path
 ):
@@ -147,6 +149,7 @@ def test_the_launcher_never_runs_a_plugin_while_its_run_goes_on(running, scene, 
     assert run.pid not in pids
 
 
+@pytest.mark.slow
 def test_a_change_that_hangs_in_the_controller_alone_is_refused_at_its_tick_and_the_run_goes_on(
     running, scene, tmp_path
 ):

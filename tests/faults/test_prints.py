@@ -70,6 +70,7 @@ def test_an_element_that_prints_leaves_the_run_and_its_bits_as_they_are(
     assert "Traceback" not in run.stderr
 
 
+@pytest.mark.slow
 def test_all_that_is_printed_stands_in_a_file_of_the_run_marked_with_node_and_tick(running, tmp_path):
     """The terminal has the first lines, and says where the others are."""
     plugin = write_plugin(tmp_path, *KINDS["each tick"])
@@ -88,6 +89,7 @@ def test_a_run_in_which_nothing_is_printed_has_no_such_file(running):
     assert not (run.out / "prints.txt").exists()
 
 
+@pytest.mark.slow
 def test_the_last_lines_of_a_run_that_fails_are_shown_however_much_came_before(running, tmp_path):
     plugin = write_plugin(tmp_path, "pass", "pass", "print('flood') if self.tick < 200 else print('last word', 1 / 0)")
     run = running("--plugin", str(plugin), scene=SCENES / "fig6a.toml", sets=SETS, pace=())

@@ -58,6 +58,7 @@ def test_status_clears_away_what_a_dead_run_has_left():
     assert not path.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["thesis", "abcdef", "ABCDEF", "abcdef0", "0a1b2c"])
 def test_a_folder_that_no_run_has_made_stays_with_all_that_is_in_it(name, live_runs_here):
     """However it is named and however old it is: XDG_RUNTIME_DIR may be a folder of documents."""

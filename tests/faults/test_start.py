@@ -56,6 +56,7 @@ def test_the_deadline_of_a_running_loop_does_not_rule_its_start(tmp_path: Path) 
         assert run.result()["ended"] == "stopped"
 
 
+@pytest.mark.slow
 def test_a_node_that_comes_with_a_wrong_secret_is_named_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -47,6 +47,7 @@ def there_is_a_compiler() -> str:
     return compiler()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("compiler")
 def test_the_file_has_the_scene_s_name_where_it_was_asked_or_the_name_it_was_given(
     wall: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

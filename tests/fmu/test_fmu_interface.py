@@ -35,6 +35,7 @@ def fmus() -> None:
     needs_fmus()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "tables",
     [LOOP, EVERY_VARIABLE, {}, {**LOOP, "title": NASTY}, {**LOOP, "clock": {"round_trip_delay": 0.0}}],

@@ -130,6 +130,7 @@ def test_a_topic_with_and_without_columns_is_refused(tmp_path: Path) -> None:
         list(stream(tmp_path))
 
 
+@pytest.mark.slow
 @given(
     st.permutations(list("abcdef")), st.sets(st.sampled_from(list("abcdef"))), st.sets(st.sampled_from(list("abcdef")))
 )

@@ -193,6 +193,7 @@ def test_no_message_is_remembered_once_its_chunk_is_closed(tmp_path: Path) -> No
     assert after - before < 200 * 2000
 
 
+@pytest.mark.slow
 def test_a_log_of_four_times_as_many_chunks_takes_no_more_memory_and_its_summary_lists_them_all(tmp_path: Path) -> None:
     """Entries of the summary pass what is held in memory, 64 kB, within the first 1000 chunks."""
     path = tmp_path / "log.mcap"

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from haploop.logger.verdict.measures import swings
+from haploop.logger.verdict.ripple import above, ripple
 from haploop.logger.verdict.window import Window
 from haploop.protocol.ticks import Timebase
 
@@ -48,6 +49,18 @@ def test_a_swing_that_goes_on_is_a_limit_cycle_and_its_width_is_the_oscillation(
     assert word == "limit-cycle"
     assert figures.oscillation_m == pytest.approx(2e-3, rel=1e-3)
     assert figures.force_ripple_N == pytest.approx(0.2 if hz > 30.0 else 0.0, rel=0.05, abs=4e-3)
+
+
+@pytest.mark.parametrize("hz", [29.7, 30.0, 30.3, 31.0])
+def test_no_ripple_is_larger_than_what_the_force_itself_swings_by(hz):
+    """Pulses of a wall, bounced off at the edge of the filter: what it lets pass is wider than the pulses."""
+    force = np.maximum(0.0, np.sin(2 * math.pi * hz * np.arange(500) / 1000.0) - 0.5)
+    wider = np.ptp(above(force, 1000.0)) > np.ptp(force)
+    assert ripple(force, 1000.0) <= np.ptp(force)
+    assert wider or hz != 30.0, "the filter alone would tell more"
+    figures = judged(lambda t: WALL - 1e-3 * np.maximum(0.0, np.sin(2 * math.pi * hz * t) - 0.5))[1]
+    assert figures.force_swing_N == pytest.approx(0.05, rel=0.01)
+    assert figures.force_ripple_N <= figures.force_swing_N
 
 
 def test_a_swing_that_dies_away_is_steady():

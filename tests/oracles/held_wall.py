@@ -51,7 +51,14 @@ _SCALED = (
     ("hand_mass",),
     ("hand_damping", "grip_damping"),
     ("hand_stiffness", "grip_stiffness"),
+    ("friction",),
+    ("damping", "motor_damping"),
+    ("most_force",),
+    ("cable_stiffness",),
+    ("cable_damping",),
 )
+# Walls bear less where there is less of these: corners with little of all are half of those that are taken.
+_HOLDS = {"friction", "damping", "motor_damping", "cable_damping"}
 _NUMBERS = [field.name for field in fields(Bodies) if field.name != "delay_s"]
 # What a preset assumes of its device.
 ASSUMED = {
@@ -67,11 +74,17 @@ def in_corners(
 ) -> tuple[Bodies, np.ndarray]:
     """Returns the members: every hold in the loop as described and in all its corners, and their holds.
 
-    Bodies and hand are a fifth off, what is assumed is half or double; of more corners as many are drawn as ``most``.
+    All that is measured is a fifth off, what is assumed is half or double; of more corners as many are drawn as
+    ``most``, half of them with little friction and damping.
     """
-    ends = [(tuple(name for name in names if name not in assumed), (0.8, 1.2)) for names in _SCALED]
-    ends = [each for each in ends if each[0]] + [((name,), (0.5, 2.0)) for name in assumed]
-    drawn = np.random.default_rng(2).permutation(2 ** len(ends))[:most]
+    there = [
+        tuple(name for name in names if name not in assumed and np.any(getattr(device, name))) for names in _SCALED
+    ]
+    ends = [(names, (0.8, 1.2)) for names in there if names] + [((name,), (0.5, 2.0)) for name in assumed]
+    order = np.random.default_rng(2).permutation(2 ** len(ends))
+    worse = sum(1 << i for i, (names, _) in enumerate(ends) if _HOLDS & set(names))
+    few = order[order & worse == 0][: most // 2]
+    drawn = np.concatenate([few, order[~np.isin(order, few)][: most - len(few)]])
     members = []
     for number in (-1, *drawn.tolist()):
         factors = {name: at[number >> i & 1] for i, (names, at) in enumerate(ends) for name in names}

@@ -137,6 +137,7 @@ def test_junk_on_every_socket_before_a_run_begins_and_while_it_runs_changes_noth
     assert len(opened) == 14
 
 
+@pytest.mark.slow
 def test_a_flood_of_junk_on_every_socket_cannot_hold_a_run_up(tmp_path: Path) -> None:
     with going(tmp_path, "duration=0.5", "run.deadline=60", pauses=(50,)) as run:
         run.stands_at(50)

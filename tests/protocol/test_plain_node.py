@@ -77,6 +77,7 @@ def assert_saw_the_log(run: Going, seen: dict[str, Any]) -> None:
         assert column(seen, "controller", name).tobytes() == log["/controller"][name][ticks].tobytes()
 
 
+@pytest.mark.slow
 def test_an_observer_that_joins_a_run_in_motion_sees_what_is_logged_and_changes_nothing(tmp_path: Path) -> None:
     with going(tmp_path, "duration=1.0", pauses=(999,), pace=2.0) as run:
         observer = Observer(run)

@@ -122,6 +122,7 @@ def test_without_late_answers_a_run_by_the_devices_time_has_the_bits_of_any_run(
     assert all(same) or late["late_ticks"], "only a late answer can change a bit"
 
 
+@pytest.mark.slow
 def test_an_answer_that_is_late_is_counted_and_the_device_is_without_force_for_that_period(tmp_path: Path) -> None:
     (tmp_path / "sleeper.py").write_text(SLEEPER)
     alone = 'dissipation=[{kind="sleeper", acts="always"}]', "wall.stiffness=0"

@@ -66,6 +66,7 @@ _SCENES = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.slow
 @given(_SCENES)
 def test_a_resolved_scene_runs_by_itself(tmp_path_factory, tables):
     """load(write(scene)) == scene: nothing is lost, converted twice or filled in anew."""

@@ -1,5 +1,6 @@
 """The tables of a scene: defaults, and every mistake in one pass."""
 
+import re
 from typing import Annotated
 
 import pytest
@@ -11,7 +12,8 @@ from haploop.launch.scene.check import resolve
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
 from haploop.protocol.scene.paths import value_at
-from haploop.protocol.scene.scene import ElementTable, Encoder, Hand, Scene, Wall
+from haploop.protocol.scene.scene import Clock, ElementTable, Encoder, Hand, Scene, Wall
+from haploop.protocol.ticks import Timebase, TimebaseError
 from helpers.scenes.least import KINDS, LEAST, WALL, mistakes, scene
 
 
@@ -60,7 +62,7 @@ def test_every_mistake_is_reported_at_once():
     )
     starts = [
         "device.mass is missing. It must be a number in kg, above 0",
-        'device.damping is "2 ms". ms has the dimension [time], but N s/m has [mass] / [time].',
+        'device.damping is "2 ms". ms is a time, but N s/m is a damping.',
         "device.mas is not a key of [device]; did you mean mass? Allowed: mass, damping, position, velocity.",
         'hand.force.kind is "rampp"; did you mean ramp? Allowed: constant, ramp, step, sine, minimum-jerk, trace.',
         "encoder.resolution is nan. It must be a finite number of m.",
@@ -94,16 +96,38 @@ def test_what_must_be_there_is_asked_for(key):
         ({"title": 3}, "title is 3. It must be text in quotes."),
         ({"dissipation": {"kind": "damping"}}, "dissipation is one table. It must be a list of tables: [["),
         ({"dissipation": [{"damping": 1}]}, "dissipation.0.kind is missing. Allowed: "),
+        ({"wall": [WALL]}, "wall is a list of tables. It must be one table: [wall], one pair of brackets."),
         ({"dissipation": [3]}, "dissipation.0 is 3. It must be a table."),
         ({"dissipation": [{"kind": "none"}]}, 'dissipation.0.kind is "none". Allowed: '),
         ({"hand": {"force": 1.0}}, "hand.force is 1.0. It must be a table."),
-        ({"clock": {"plant_rate": 1500}}, "clock.plant_rate is 1500. The plant_rate must be a whole multiple"),
+        (
+            {"clock": {"plant_rate": 1500}},
+            "clock.control_rate is 1000. The control_rate must divide plant_rate, but 1500 Hz is 1.5 times 1000 Hz; "
+            "legal and nearest are a control_rate of 750 Hz or 1500 Hz, or a plant_rate of 1000 Hz or 2000 Hz.",
+        ),
         ({"run": {"log": "ticcs"}}, 'run.log is "ticcs"; did you mean ticks? Allowed: steps, ticks, none.'),
     ],
 )
 def test_a_wrong_shape_is_one_sentence(tables, sentence):
     [mistake] = mistakes(**tables)
     assert mistake.startswith(sentence)
+
+
+@pytest.mark.parametrize("kind", [{}, {"kind": "dampping"}])
+def test_a_table_without_a_known_kind_has_its_misspelt_keys_told_at_once(kind):
+    told = mistakes(dissipation=[{**kind, "dampin": 2.0, "mass": 1.0}])
+    assert [line.split()[0] for line in told] == ["dissipation.0.kind", "dissipation.0.dampin"]
+    assert "is a key of no kind; did you mean damping?" in told[1]
+
+
+@pytest.mark.parametrize(("plant", "control"), [(1_000_003, 1000), (999_999_937, 2), (3, 10), (10_000, 3000)])
+def test_a_rate_that_does_not_divide_is_told_ones_that_do(plant, control):
+    with pytest.raises(TimebaseError) as error:
+        Timebase.from_clock(Clock(plant_rate=plant, control_rate=control), 1.0)
+    controls, plants = str(error.value).splitlines()[0].partition("legal and nearest")[2].split("a plant_rate of")
+    assert all(plant % int(rate) == 0 for rate in re.findall(r"\d+", controls))
+    assert all(int(rate) % control == 0 for rate in re.findall(r"\d+", plants))
+    assert "control_rate of" in controls
 
 
 def test_the_mistake_carries_its_parts():

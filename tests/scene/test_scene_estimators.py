@@ -26,6 +26,7 @@ def test_a_scene_that_names_one_resolves_to_si_numbers_and_to_itself():
     assert scene(**found.as_dict()) == found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tables", "sentences"),
     [

@@ -192,7 +192,24 @@ def test_a_directory_is_no_scene(tmp_path):
 
 def test_all_files_that_cannot_be_read_are_reported_at_once(files):
     found = file_mistakes(files(a='extends = ["gone.toml", "bad.toml"]\n', bad="x"))
-    assert [line.split(":")[0] for line in found] == ["gone.toml", "bad.toml"]
+    assert [line.split(":")[0] for line in found] == ["a.toml", "bad.toml"]
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("devices/premuim15.toml", "devices/premium15.toml"), ("mine/fu_cavusoglu_y.toml", "hands/fu_cavusoglu_y.toml"),
+     ("base2.toml", "base.toml"), ("zzzzzzzz", None)],
+)  # fmt: skip
+def test_a_name_in_extends_that_is_no_file_is_told_with_its_line_and_the_one_that_was_meant(files, name, meant):
+    [mistake] = file_mistakes(files(top=f'duration = 1.0\nextends = "{name}"\n', base=LEAST_TOML))
+    assert mistake.startswith(f'top.toml:2: extends names "{name}", but there is no such file')
+    assert (f"; did you mean {meant}?" in mistake) if meant else ("did you mean" not in mistake)
+
+
+@pytest.mark.parametrize("value", ['"3 N/mm', "'3 N/mm", '["a", "b]', '"""3'])
+def test_a_quotation_mark_that_is_not_closed_is_told_in_words(files, value):
+    [mistake] = file_mistakes(files(top=f"title = {value}\nseed = 1\n"))
+    assert mistake.endswith(" A quotation mark is not closed.")
 
 
 def test_a_byte_order_mark_is_no_mistake(tmp_path):
@@ -253,7 +270,7 @@ def test_units_in_the_header_of_a_recorded_force_are_read(files, tmp_path, csv, 
     (tmp_path / "push.csv").write_text(csv.replace("F [mN]", "m (g)").replace("force (N)", "m (kg)"))
     [mistake] = file_mistakes(path)
     assert "Line 1, the header of time and force:" in mistake
-    assert "has the dimension [mass]" in mistake
+    assert "is a mass, but" in mistake
 
 
 COUNTED = LEAST_TOML + '[encoder]\nbits = 14\nrange = "0.2 m"\n'

@@ -82,3 +82,12 @@ def test_check_says_whose_plant_can_run_it(file: Path):
     answer = CliRunner().invoke(app, ["check", str(file)])
     assert answer.exit_code == 0
     assert "can be run with a plant of yours" in answer.stderr
+
+
+def test_check_says_that_a_scene_has_no_wall_and_nothing_of_one_that_has(tmp_path: Path):
+    said = []
+    for name, wall in (("bare", ""), ("walled", "[wall]\nposition = 0.0\nstiffness = 100.0\n")):
+        (tmp_path / f"{name}.toml").write_text(f"duration = 1.0\n[device]\nmass = 0.1\ndamping = 0.1\n{wall}")
+        said.append(CliRunner().invoke(app, ["check", str(tmp_path / f"{name}.toml")]).stderr)
+    assert "It has no [wall]: nothing pushes the device back." in said[0]
+    assert "[wall]" not in said[1]

@@ -34,6 +34,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "a": made(base / "a"),
         "again": made(base / "again", "title=again"),
         "swapped": made(base / "swapped", "title=[swapped]", "event.0.at=1", "event.0.set={'wall.stiffness'=90.0}"),
+        "bare": made(base / "bare", "dissipation=[]"),
         "slow": made(base / "slow", "clock.control_rate=500", "clock.round_trip_delay=0"),
     }
     log = (found["a"] / "log.mcap").read_bytes()
@@ -86,7 +87,12 @@ def test_ticks_of_unlike_clocks_are_not_compared(runs):
 def test_diff_tells_it_as_a_table_and_as_one_json_object(runs):
     told = haploop("diff", runs["a"], runs["swapped"])
     assert told.exit_code == 0
-    assert re.search(r"They part at tick (1\d\d\d), at 1.\d+ s, in wall\.", told.stdout)
+    assert re.search(r"They part at tick (1\d\d\d), at 1.\d+ s: up to there every bit is the same, then", told.stdout)
+    assert "the force of the wall (column wall) differs first." in " ".join(told.stdout.split())
+    heads = told.stdout.split("\n", 2)[1].split()
+    assert heads == ["a", "swapped"], "the directories tell the runs apart"
+    rows = [line.split("  ")[0].strip() for line in told.stdout.splitlines()]
+    assert {"force, peak to peak", "pushed, it swings by", "wall and elements together"} <= {*map(str.strip, rows)}
     assert "[swapped]" in told.stdout, "brackets are no markup"
     assert json.loads(haploop("diff", runs["a"], runs["swapped"], "--json").stdout)["parting"]["column"] == "wall"
     assert "holds no log.mcap" in haploop("diff", runs["a"], runs["a"].parent).stderr
@@ -102,6 +108,15 @@ def test_an_overlay_draws_every_run_with_its_name_and_what_differs(runs):
     assert "clock.control_rate 500 Hz" in told[3]
     assert not any("–" in label for label in labels(given)), "a key that a run has not is not told of it"
     assert labels(data(runs, "a", "a")) == [given[0].scene.title] * 2
+    with_one, without = data(runs, "a", "bare")
+    assert labels([with_one, without]) == [
+        "with unidirectional-inertia (mass 0.01 kg)",
+        "without unidirectional-inertia",
+    ]
+    assert [text.get_text() for text in artists(make_overlay([with_one, without]), "title")] == [without.scene.title]
+    beside = difference(with_one, without).energies_J
+    assert None not in beside["together"], "of one book, that is all of it"
+    assert beside["together"][1] == beside["wall"][1]
     assert list(unlike_keys([given[0].scene, given[3].scene])) == ["clock.control_rate", "clock.round_trip_delay"]
     drawn = artists(figure, "energy")[0].get_ydata()
     taken_J = given[0].books()[-1].true_J

@@ -147,6 +147,7 @@ def test_a_log_without_plant_steps_draws_and_its_books_are_the_same(poor, tmp_pa
     make_figure(RunData.from_directory(tmp_path / "ticks"))
 
 
+@pytest.mark.slow
 def test_as_processes_in_small_blocks_the_books_have_the_same_bits(poor, tmp_path):
     cut = ["run.block_ticks=7", "run.window_blocks=1", "run.log=none"]
     summary = made(tmp_path / "processes", POOR_LOOP, *cut, in_process=False)

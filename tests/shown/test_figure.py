@@ -93,6 +93,7 @@ def test_every_kind_of_run_draws_and_every_axis_has_its_unit(runs: dict[str, Pat
             assert any(f"({unit})" in label for unit in ("s", "mm", "N", "m/s", "g m/s", "J", "mJ", "µJ", "nJ"))
 
 
+@pytest.mark.slow
 def test_the_figure_is_written_where_it_is_asked_for(runs: dict[str, Path], tmp_path: Path) -> None:
     assert draw(runs["tap"]) == runs["tap"] / "figure.png"
     assert (runs["tap"] / "figure.png").read_bytes().startswith(PNG)
@@ -228,6 +229,7 @@ def test_the_header_tells_verdict_and_numbers(runs: dict[str, Path]) -> None:
     assert "pushed, it swings less than 1 nm peak to peak, felt" in key_numbers(data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.4, 0.8])
 def test_a_run_that_was_killed_still_draws(runs: dict[str, Path], tmp_path: Path, share: float) -> None:
     """With half a log and no summary; even without the scene file, which the log holds too."""
@@ -240,6 +242,7 @@ def test_a_run_that_was_killed_still_draws(runs: dict[str, Path], tmp_path: Path
     assert key_numbers(data)[0].startswith("log cut off")
 
 
+@pytest.mark.slow
 def test_a_run_draws_whose_log_of_the_plant_ends_long_before_that_of_the_controller(runs: dict[str, Path]) -> None:
     """As where a run is killed: channels are written chunk by chunk. Its close view holds no plant step."""
     data = RunData.from_directory(runs["swap"])

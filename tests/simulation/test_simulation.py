@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from simulation.computer import network
 from simulation.defects import DEFECTS, put_back, seeds_needed
 from simulation.faults import Kill, LateStart, Slow, Stop, When
 from simulation.plan import Plan, draw, fewest, shrink, tell
@@ -68,6 +69,10 @@ _SLOW_BLOCK = replace(_CALM, scene="least", faults=(Slow(When(40, 0.0), "plant",
 _STOPPED_AT_THE_END = replace(_CALM, faults=(SecondLogger(When(1, 0.0), ("held", 0.012)),))
 
 
+# Nothing of what is sent to a stopped logger leaves its sender: the kernel is as good as full.
+_NO_ROOM = replace(_CALM, faults=(Stop(When(70, 0.008), "logger", 1.6),))
+
+
 @pytest.mark.parametrize(
     ("plan", "defect"),
     [
@@ -84,6 +89,17 @@ def test_a_history_ends_in_order_that_a_defect_put_back_breaks(plan: Plan, defec
     assert ends() == ("", "in order")
     with put_back(defect):
         assert ends() != ("", "in order")
+
+
+def test_plant_and_controller_stay_until_the_logger_has_all_and_else_the_deadline_says_who_waits_for_what(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(network, "_KERNEL_BYTES", 0)
+    outcome = play(_NO_ROOM)
+    assert (outcome.broken, outcome.how) == ("", "in order")
+    with put_back("the logger is not waited for at the end"):
+        broken = play(_NO_ROOM).broken
+    assert "the logger is at tick 70 and waits for the plant's END." in broken
 
 
 def test_a_seed_gives_the_same_history_again() -> None:

@@ -62,6 +62,7 @@ def test_a_loop_judged_among_others_has_the_words_and_bits_it_has_alone(family):
     assert len({result["verdict"] for result in alone}) > 1
 
 
+@pytest.mark.slow
 def test_a_scene_may_ask_for_the_cheap_verdict_and_others_of_its_batch_are_judged_all_the_same():
     pushed = shipped("fig6a", [20.0, 80.0, 200.0, 300.0])
     mixed = [by_window(scene) if index % 2 else scene for index, scene in enumerate(pushed)]

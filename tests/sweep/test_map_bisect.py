@@ -157,6 +157,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["grid", "search"])
 def test_haploop_plot_draws_a_sweep_of_haploop_sweep(swept: dict[str, Path], name: str) -> None:
     done = CliRunner().invoke(app, ["plot", str(swept[name])])
@@ -172,6 +173,7 @@ def test_the_boundaries_drawn_are_those_of_the_program_s_table(swept: dict[str, 
     assert np.array_equal(line.get_ydata(), found.boundary["boundary"], equal_nan=True)
 
 
+@pytest.mark.slow
 def test_a_sweep_that_still_runs_is_drawn_from_its_parts(swept: dict[str, Path], tmp_path: Path) -> None:
     (tmp_path / "parts").mkdir()
     shutil.copy(swept["grid"] / "sweep.toml", tmp_path)

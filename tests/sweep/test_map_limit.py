@@ -50,6 +50,7 @@ def with_values(made: Scene, **values: float) -> Scene:
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("values", [[0.05, 0.1, 0.2, 0.4], [0.01, 0.1, 1.0, 10.0], [0.0, 0.01, 0.1, 1.0]])
 @pytest.mark.parametrize("delay", [0.0, 0.002])
 def test_every_point_of_the_exact_limit_is_the_stiffness_limit_there(values: list[float], delay: float) -> None:

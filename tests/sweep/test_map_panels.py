@@ -42,6 +42,7 @@ def test_names_and_third_axes_make_panels_with_one_scale() -> None:
     assert [kind in title for kind, title in zip(kinds, titles, strict=True)] == [True] * 3
 
 
+@pytest.mark.slow
 def test_more_panels_than_have_room_are_left_out_and_counted() -> None:
     axes = {K: STIFFNESSES[:2], B: DAMPINGS[:2], "dissipation.0.kind": [f"kind-{number}" for number in range(14)]}
     cells = cells_of(axes)

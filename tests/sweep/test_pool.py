@@ -61,6 +61,7 @@ def of_many_structures() -> list[Scene]:
     return [pressed(100.0 + 10.0 * k, **effects[k % 3], seed=k) for k in range(60)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_every_scene_comes_back_once_with_every_bit_it_has_in_one_array(workers: int) -> None:
     scenes = of_many_structures()

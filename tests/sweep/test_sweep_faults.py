@@ -82,6 +82,7 @@ def test_interrupted_once_it_stores_what_is_under_way_and_says_how_to_go_on(
     assert read(out)["cell"].tolist() == list(range(CELLS))
 
 
+@pytest.mark.slow
 def test_interrupted_twice_it_ends_at_once_and_keeps_what_was_stored(
     launched: Callable[..., Launched], tmp_path: Path
 ) -> None:

@@ -156,6 +156,8 @@ GARBAGE = [
     '{"type": "watch", "points": true}',
     '{"type": "watch", "points": Infinity}',
     '{"type": "watch", "end_s": []}',
+    '{"type": "drawn", "snapshots": 0}',
+    '{"type": "drawn", "snapshots": true}',
     '{"type": "command"}',
     '{"type": "command", "verb": 1}',
     '{"type": "command", "verb": "pause", "arguments": []}',
@@ -258,6 +260,7 @@ async def test_a_token_that_is_no_text_of_any_encoding_is_a_wrong_token():
         assert not here.guard.redeem("\udc80")
 
 
+@pytest.mark.slow
 @scenario
 async def test_connections_that_ask_for_nothing_are_closed_and_never_more_than_a_hundred_and_those_of_pages_stay(
     monkeypatch,
@@ -279,6 +282,7 @@ async def test_connections_that_ask_for_nothing_are_closed_and_never_more_than_a
         assert not (await tab.send("pause", {}, here.guard.token))[0]
 
 
+@pytest.mark.slow
 @scenario
 async def test_where_asked_the_server_ends_once_its_last_page_is_closed_and_not_when_one_is_loaded_anew(monkeypatch):
     monkeypatch.setattr(server, "_ANEW_S", 0.05)

@@ -2,6 +2,7 @@
 
 import asyncio
 
+import aiohttp
 import numpy as np
 import pytest
 
@@ -47,6 +48,7 @@ def test_every_sample_of_the_snapshot_is_the_logs(tmp_path):
     follow(play, tmp_path, pauses=(600,))
 
 
+@pytest.mark.slow
 def test_a_long_view_is_an_envelope_that_touches_every_extreme(tmp_path):
     async def play(run, tab, here):
         await stands(run, 3000)
@@ -68,6 +70,7 @@ def test_a_long_view_is_an_envelope_that_touches_every_extreme(tmp_path):
     follow(play, tmp_path, pauses=(3000,))
 
 
+@pytest.mark.slow
 def test_the_window_is_what_the_page_watches(tmp_path):
     """The last seconds, seconds further back, and nothing where nothing is."""
 
@@ -109,14 +112,21 @@ def test_since_now_shows_nothing_older(tmp_path):
     follow(play, tmp_path, pauses=(500,))
 
 
+async def listen(stream, heard):
+    async for message in stream:
+        heard.append(message.type)
+
+
 @pytest.mark.slow
 def test_pages_that_come_go_and_say_nothing_leave_the_bits_of_the_run_alone(tmp_path):
-    """Snapshots all the while, one page that reads nothing, one that leaves without a word."""
+    """Snapshots all the while, one page that reads nothing, one that draws nothing, one that leaves without a word."""
 
     async def play(run, tab, here):
         await tab.phase("paused")
         deaf = await here.stream()
         deaf._response.connection.transport.pause_reading()
+        hidden, heard = await here.stream(), []
+        reading = asyncio.create_task(listen(hidden, heard))
         rude = await here.tab()
         await rude.socket.send_json({"type": "watch", "span_s": None, "points": 8000})
         await tab.ask("pace", pace=2)
@@ -126,6 +136,8 @@ def test_pages_that_come_go_and_say_nothing_leave_the_bits_of_the_run_alone(tmp_
         rude.socket._response.connection.transport.abort()
         await tab.phase("ended")
         assert tab.snapshots > 10
+        reading.cancel()
+        assert heard.count(aiohttp.WSMsgType.BINARY) == 2, "no more than two before the page says that it has drawn"
         return tab.state["skipped_ticks"]
 
     with going(tmp_path, "duration=3", pauses=(100,)) as run:

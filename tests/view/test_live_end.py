@@ -20,6 +20,7 @@ from helpers.live.launched import first_and_slowly
 from helpers.live.live_run import going
 
 
+@pytest.mark.slow
 def test_the_end_is_told_with_the_summary_and_what_was_seen_can_still_be_looked_at(tmp_path):
     async def play(run, tab, here):
         await tab.phase("paused")
@@ -100,6 +101,7 @@ def test_the_verdict_of_a_run_whose_summary_cannot_be_read_is_not_known(tmp_path
     follow(play, tmp_path, "duration=0.5", "wall.position=-0.001", pauses=(200,))
 
 
+@pytest.mark.slow
 def test_the_next_run_is_taken_up_and_the_first_stays_on_show_until_then(tmp_path):
     async def scenario():
         async with site() as here:
@@ -123,6 +125,7 @@ def test_the_next_run_is_taken_up_and_the_first_stays_on_show_until_then(tmp_pat
     to_its_end(scenario())
 
 
+@pytest.mark.slow
 def test_a_failed_run_says_why(tmp_path):
     async def play(run, tab, here):
         state = await tab.until("the nodes", lambda: tab.state if (tab.state or {}).get("nodes") else None)

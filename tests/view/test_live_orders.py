@@ -4,10 +4,12 @@ import asyncio
 import json
 
 import numpy as np
+import pytest
 
 from helpers.live.followed import follow, has_logged, same, stands, whole
 
 
+@pytest.mark.slow
 def test_commands_of_the_page_reach_the_run_and_what_took_effect_is_told_with_its_tick(tmp_path):
     async def play(run, tab, here):
         await stands(run, 500)
@@ -79,6 +81,7 @@ REFUSED = [
 ]
 
 
+@pytest.mark.slow
 def test_what_is_refused_comes_back_as_a_sentence_and_changes_nothing(tmp_path):
     async def play(run, tab, here):
         await stands(run, 300)

@@ -69,6 +69,7 @@ def test_a_taken_port_is_named(launched):
     assert f"Port {port} of 127.0.0.1 cannot be used" in answer.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [

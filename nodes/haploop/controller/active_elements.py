@@ -33,14 +33,15 @@ class ActiveElement:
     Attributes:
         acts: "always", or "in-contact": the force is 0 out of contact.
         book: number of the book, in order of opening within the run.
-        swapped: tick of the swap that brought it and what was in its place, None for nothing; None for the scene's own.
+        swapped: tick of the swap that brought it, what was in its place, None for nothing, and the plugin file that
+            came with the swap, if any; None for the scene's own.
     """
 
     element: Element
     acts: str
     book: int
     from_tick: int
-    swapped: tuple[int, ActiveElement | None] | None = None
+    swapped: tuple[int, ActiveElement | None, str | None] | None = None
 
     def describe(self) -> Description:
         parameters = {**self.element.values(), "acts": self.acts}

@@ -24,17 +24,17 @@ Kinds = dict[str, type[Element]]
 def apply_change(
     change: Change, params: ControllerParams, state: ControllerState, kinds: Kinds
 ) -> tuple[ControllerParams, ControllerState]:
-    """Returns parameters and state after a change that was checked before; whatever raises leaves both as they were.
-
-    A plugin is loaded first; it lies in the run's own directory, put there by the launcher.
-    """
-    if change.plugin is not None:
-        kinds.update(load_plugin(Path(change.plugin)))
+    """Returns parameters and state after a change that was checked before; whatever raises leaves both as they were."""
     if change.swap is not None:
         params, state = _swapped(params, state, change, change.swap, kinds)
     for key, value in change.set.items():
         params = _set(params, change.tick, key.split("."), value)
     return params, state
+
+
+def code_of(change: Change) -> Kinds:
+    """Loads the plugin that a change comes with; it lies in the run's own directory, put there by the launcher."""
+    return {} if change.plugin is None else load_plugin(Path(change.plugin))
 
 
 def _swapped(
@@ -44,7 +44,8 @@ def _swapped(
     if table.name == NO_ELEMENT:
         return _replaced(params, state, change.element, None)
     before = replace(params.elements[change.element], swapped=None) if change.element < len(params.elements) else None
-    active = ActiveElement(*make_element(table, kinds), params.books, change.tick, (change.tick, before))
+    came = (change.tick, before, change.plugin)
+    active = ActiveElement(*make_element(table, kinds), params.books, change.tick, came)
     return _replaced(params, state, change.element, active)
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import ChainMap
 from collections.abc import Sequence
 from copy import copy, deepcopy
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.active_elements import ActiveElement, make_element
 from haploop.controller.asked import Declared, shown
-from haploop.controller.changes import Kinds, apply_change, take_back, try_element
+from haploop.controller.changes import Kinds, apply_change, code_of, take_back, try_element
 from haploop.controller.dissipation import ElementError, Motion
 from haploop.controller.dissipation.element import place_in
 from haploop.controller.estimators.base import Sample
@@ -49,6 +50,8 @@ class Controller:
 
     def __init__(self, scene: Scene, time: Timebase, kinds: Kinds, recorder: Recorder | None = None) -> None:
         self._kinds, self._control_rate = dict(kinds), time.control_rate
+        # The code of plugins that came with a swap, with its tick and file: a later one takes the place of one before.
+        self._reloaded: tuple[tuple[int, str | None, Kinds], ...] = ()
         self._restores = scene.run.faulty_swap == "restore"
         self.params = make_params(scene, time.period_s, self._kinds)
         self.state: StateTuple | None = None
@@ -131,7 +134,9 @@ class Controller:
             change = self._changes.pop(0)
             params = self.params
             try:
-                params, after = apply_change(change, self.params, state, self._kinds)
+                reloaded = (*self._reloaded, (change.tick, change.plugin, code_of(change)))
+                kinds = dict(ChainMap(*(code for *_, code in reversed(reloaded)), self._kinds))
+                params, after = apply_change(change, self.params, state, kinds)
                 if change.swap is not None and change.swap.name != NO_ELEMENT:
                     try_element(change.element, params, after, sample)
             except NoForce as error:
@@ -141,6 +146,7 @@ class Controller:
                 self.recorder.refused.append(change.refuse(error, place_in(None, error)))
             else:
                 self.params, state = params, after
+                self._reloaded = reloaded if change.plugin else self._reloaded
         self._next_change = self._changes[0].tick if self._changes else _NEVER
         self.recorder.open(self.params)
         return state
@@ -157,9 +163,12 @@ class Controller:
             if not self._restores or swapped is None or self.tick - swapped[0] >= self._control_rate:
                 raise ElementError(why) from error.__cause__
             self.recorder.cut()
-            change, self.params, state = take_back(place, swapped[1], self.params, state, self.tick)
+            since, before, plugin = swapped
+            change, self.params, state = take_back(place, before, self.params, state, self.tick)
+            self._reloaded = tuple(each for each in self._reloaded if each[:2] != (since, plugin))
             self.recorder.open(self.params)
-            self.recorder.restored.append(restoration(change, f"{why} It is taken back: {change.describe()}."))
+            sentence = f"{why} It is taken back: {change.describe()}."
+            self.recorder.restored.append(restoration(change, sentence, since, plugin))
             try:
                 return tick(self.params, state, sample)
             except NoForce as other:

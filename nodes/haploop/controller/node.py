@@ -41,9 +41,10 @@ class ControllerNode:
         self._installed: dict[str, str] = told["elements"]
         named = {table.name for table in scene.dissipation}
         kinds = registry([Path(path) for path in told["plugins"]], self._places(named))
-        self._controller = Controller(scene, Timebase(**welcome["timebase"]), kinds)
+        time = Timebase(**welcome["timebase"])
+        self._controller = Controller(scene, time, kinds)
         mark_ticks(lambda: self._controller.tick)
-        self._block = BlockLength(scene.run.block_ticks, machine_of(context).now)
+        self._block = BlockLength(time.block_ticks(scene.run), machine_of(context).now)
         self._reported = self._idle_ms = 0
         self._secret = told["secret"]
         is_foreign = not told.get("programs", {}).get("plant", {"own": True})["own"]

@@ -106,7 +106,7 @@ def _make(elements: list[tuple[str, dict[str, float]]], kinds: dict[str, type[El
             motion = Motion(0.001, -1.0).telling(dict.fromkeys(ASKABLE, 0.0), element.asks)
             motion.contact = contact
             try:
-                force = element.force(motion) if memory is None else element.force(motion, memory)[0]
+                force, _ = (element.force(motion), None) if memory is None else element.force(motion, memory)
                 finite = math.isfinite(force)
             except Exception as error:
                 what = raised(error, type(element))

@@ -12,6 +12,7 @@ import numpy as np
 from haploop.logger.books.books import Books
 from haploop.logger.books.buffers import Commanded
 from haploop.logger.summary import Account, Summary, energy, finite, note_accounts, outcome
+from haploop.logger.verdict.changes_made import ChangesMade
 from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
 from haploop.protocol.arrays import rows_of
 from haploop.protocol.scene.scene import Scene
@@ -60,6 +61,7 @@ class BatchLogger:
 
     Attributes:
         rows: the last controller rows, which books still need; the latest is of tick ``tick - 1``.
+        changes: those of every member alike.
         tick: every interval before it is booked.
     """
 
@@ -68,6 +70,7 @@ class BatchLogger:
         self.books = Books(scene, time, members) if energy else None
         self.window = Window(time, scene.encoder.resolution if scene.encoder else 0.0, members)
         self.rows: list[Row] = []
+        self.changes = ChangesMade()
         self._accounts: dict[int, Account] = {}
         self._trajectories = Trajectories(members) if trajectories else None
         self.tick = 0
@@ -141,7 +144,9 @@ class BatchLogger:
                 ran.setdefault(entry, {})[name] = counts[index]
             if self._trajectories:
                 ran["trajectory_sha256"] = self._trajectories.digest(end.place)
-            entries = outcome(end.scene, ran, one, end.reason)
+            changed = self.changes.last_within(one.window.figures.from_s * self._time.control_rate, self.tick)
+            changed_s = None if changed is None else changed / self._time.control_rate
+            entries = outcome(end.scene, ran, one, end.reason, changed_s)
             is_finite = one.is_finite() and math.isfinite(end.v_m_s)
             yield (entries if is_finite else finite(entries)) | energies
 

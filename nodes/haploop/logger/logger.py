@@ -15,6 +15,7 @@ from haploop.logger.books.books import Books
 from haploop.logger.books.buffers import ControllerBuffer, PlantBuffer
 from haploop.logger.log.channels import Channels, motion_columns
 from haploop.logger.summary import Account, Summary, energy, note_accounts, outcome, versions
+from haploop.logger.verdict.changes_made import ChangesMade
 from haploop.logger.verdict.measures import RunMeasures
 from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
 from haploop.plant.counters import COUNTERS
@@ -48,6 +49,7 @@ class Logger:
         self._accounts: dict[int, Account] = {}
         self._events: list[tuple[int, Event]] = []
         self._not_made: list[str] = []
+        self._changes = ChangesMade()
         self._counted: Counter[str] = Counter()
         self._digest = hashlib.sha256()
         self.booked: Callable[[int, dict[str, np.ndarray]], object] = lambda first, books: None
@@ -98,6 +100,7 @@ class Logger:
     def _log_events(self) -> None:
         while self._events and self._events[0][0] <= self.tick:
             tick, event = self._events.pop(0)
+            self._changes.note(tick, event)
             if self._channels:
                 self._channels.event(tick, event)
 
@@ -214,7 +217,7 @@ class Logger:
         has_wall = self._scene.wall is not None
         energies = energy(books, accounts, has_wall) | self._balance()
         told = {"not_made": self._not_made} if self._not_made else {}
-        return outcome(self._scene, ran, self._measured(), diverged) | {"energy": energies} | told
+        return outcome(self._scene, ran, self._measured(), diverged, self._changed_s) | {"energy": energies} | told
 
     def _balance(self) -> dict[str, str]:
         """Returns what the books leave unexplained as the sentence ``balance``, where it is worth one."""
@@ -228,12 +231,20 @@ class Logger:
             (self._measures,) = self.window.measures()
         return self._measures
 
+    @property
+    def _changed_s(self) -> float | None:
+        """When the loop was last changed within the window, s; None if it was not."""
+        first = self._first_tick + self._measured().window.figures.from_s * self.time.control_rate
+        tick = self._changes.last_within(first, self.tick)
+        return None if tick is None else tick / self.time.control_rate
+
     def status(self) -> Message:
         """Returns where the run is and its measures, for progress lines and viewers."""
         if self.tick == self._first_tick:
             return {}
-        measures, books = self._measured(), self.books.state
-        verdict, figures = measures.verdict(None), measures.window.figures
+        measures, books, changed_s = self._measured(), self.books.state, self._changed_s
+        verdict = measures.verdict(None, measures.untold(self.tick, "", changed_s))
+        figures = (measures if changed_s is None else measures.of_two_loops()).window.figures
         return {
             "t_s": self.tick / self.time.control_rate,
             "verdict": verdict.word,

@@ -93,14 +93,19 @@ def energy(books: BooksState, accounts: Sequence[Account], has_wall: bool) -> Su
     }
 
 
-def outcome(scene: Scene, ran: Summary, measures: RunMeasures, diverged: str | None) -> Summary:
+def outcome(
+    scene: Scene, ran: Summary, measures: RunMeasures, diverged: str | None, changed_s: float | None = None
+) -> Summary:
     """Returns the entries of ``summary.json`` but for energies: what was run, the verdict and what it rests on.
 
     Args:
         ran: duration_s, ticks, steps, ended, final, lost and what else was counted, trajectory_sha256.
         diverged: why the plant ended by itself, or None.
+        changed_s: when the loop was last changed within the window, or None.
     """
-    verdict = measures.verdict(diverged)
+    verdict = measures.verdict(diverged, measures.untold(ran["ticks"], ran["ended"], changed_s))
+    if changed_s is not None:
+        measures = measures.of_two_loops()
     return {
         "title": scene.title,
         "seed": scene.seed,

@@ -41,7 +41,7 @@ def make_motion(scene: Scene, time: Timebase, members: int | None = None) -> Any
     if members is None:
         return find_integrator(scene.clock.integrator).make_motion(scene, time)
     if scene.friction:
-        from haploop.plant.friction.motion import BatchFrictionMotion
+        from haploop.plant.friction.batch import BatchFrictionMotion
 
         return BatchFrictionMotion(scene, time, members)
     from haploop.plant.chain.motion import ChainMotion

@@ -38,7 +38,7 @@ class PlantNode:
         self._plant = Plant(scene, timebase)
         # Over a network a message takes its time, however few samples it holds.
         least_ticks = timebase.lookahead_ticks + 1 if transport_of(context).host else 1
-        self._block = BlockLength(scene.run.block_ticks, machine_of(context).now, least_ticks)
+        self._block = BlockLength(timebase.block_ticks(scene.run), machine_of(context).now, least_ticks)
         self._flushed = 0
         self._secret = welcome["context"]["secret"]
         self._is_controller_foreign = not welcome["context"].get("programs", {}).get("controller", {"own": True})["own"]

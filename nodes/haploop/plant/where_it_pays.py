@@ -12,7 +12,7 @@ class WhereItPays:
     The module has ``try_out()``, which raises where the loops cannot be compiled, or loaded.
 
     Attributes:
-        may_wait: whether this process may wait until they are compiled, 12 s, or a minute on a busy machine: not the
+        may_wait: whether this process may wait until they are compiled, 16 s, or a minute on a busy machine: not the
             nodes of a run, which have deadlines; runs in one process and batches set it.
         pays: from how much on it pays.
         asked: how much was to be done so far.

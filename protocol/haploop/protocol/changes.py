@@ -145,9 +145,22 @@ def refusals_as_status(refused: Iterable[Change], restored: Sequence[Event] = ()
     return status | ({"restored": list(restored)} if restored else {}) or None
 
 
-def restoration(change: Change, why: str) -> Event:
-    """Returns the event that tells of a swap that was taken back: what took its place, from which tick on, and why."""
-    return {"restored": why, "change": change.as_dict()}
+def restoration(change: Change, why: str, since: int | None = None, plugin: str | None = None) -> Event:
+    """Returns the event that tells of a swap that was taken back: what took its place, from which tick on, and why.
+
+    ``since`` is the tick of that swap and ``plugin`` the file that came with it, which is taken back, too.
+    """
+    code = {} if plugin is None else {"code": {"tick": since, "plugin": plugin}}
+    return {"restored": why, "change": change.as_dict()} | code
+
+
+def is_off(tick: int, event: Event, events: Sequence[tuple[int, Event]]) -> bool:
+    """Tells whether a change that came with a plugin was refused or taken back, by the events of its run."""
+    change, code = Change.from_dict(tick, event), {"tick": tick, "plugin": event["plugin"]}
+    refused = (refused_change(other) for _, other in events if "refused" in other)
+    return any(other.get("code") == code for _, other in events) or any(
+        told and told.plugin == change.plugin and change.is_as(told) for told in refused
+    )
 
 
 def refused_change(event: Event) -> Change | None:
@@ -181,7 +194,8 @@ def refusals_of(status: Event, events: Iterable[tuple[int, Event]] = ()) -> list
     taken_back = status.get("restored")
     for told in taken_back if isinstance(taken_back, list) else ():
         if change := refused_change(told):
-            found.append(restoration(change, str(told.get("restored"))))
+            code = told.get("code") or {}
+            found.append(restoration(change, str(told.get("restored")), code.get("tick"), code.get("plugin")))
     return found
 
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
-from haploop.protocol.scene.scene import Clock, Scene
+from haploop.protocol.scene.scene import Clock, Run, Scene
 
 # Decimal fractions such as 0.0003 s are not exact in binary; a whole number of steps is accepted within this.
 _WHOLE_WITHIN = 1e-6
@@ -15,6 +15,8 @@ _WHOLE_WITHIN = 1e-6
 DELAY = "clock.round_trip_delay"
 # What one run can hold in memory and come to the end of: plant steps in a tick, commands on their way, ticks in all.
 _MOST_STEPS, _MOST_ON_THEIR_WAY, _MOST_TICKS = 10_000, 100_000, 10**10
+# Some 5 MB: a message of more than 64 MiB is refused, and all that is on its way is held in memory.
+_MOST_STEPS_IN_A_BLOCK = 1 << 16
 
 
 class TimebaseError(ValueError):
@@ -52,10 +54,7 @@ class Timebase:
         delay = clock.round_trip_delay
         complaints = []
         if plant_rate % control_rate:
-            complaints.append(
-                f"plant_rate must be a whole multiple of control_rate, "
-                f"but {plant_rate} Hz is {plant_rate / control_rate:.6g} times {control_rate} Hz."
-            )
+            complaints.append(_not_whole(plant_rate, control_rate))
         elif plant_rate > _MOST_STEPS * control_rate:
             complaints.append(
                 f"plant_rate must be at most {_MOST_STEPS} times control_rate, since the steps of a tick are held at "
@@ -107,6 +106,10 @@ class Timebase:
         """
         return self.delay_steps // self.steps_per_tick
 
+    def block_ticks(self, run: Run) -> int:
+        """Returns the most ticks in a block: ``run.block_ticks``, or fewer where they would hold too many steps."""
+        return min(run.block_ticks, _MOST_STEPS_IN_A_BLOCK // self.steps_per_tick)
+
     def tick_ns(self, tick: int) -> int:
         """Returns the time of a tick in whole nanoseconds, rounded down."""
         return tick * 1_000_000_000 // self.control_rate
@@ -114,6 +117,19 @@ class Timebase:
     def first_tick_at(self, seconds: float) -> int:
         """Returns the first tick at or after a time in s, ceil(seconds * control_rate)."""
         return math.ceil(seconds * self.control_rate - _WHOLE_WITHIN)
+
+
+def _not_whole(plant_rate: int, control_rate: int) -> str:
+    """Returns the complaint of rates that do not divide, with the nearest of either that do."""
+    times = plant_rate / control_rate
+    rates = [n * control_rate for n in (math.floor(times), math.ceil(times)) if n]
+    counts = range(math.ceil(times), _MOST_STEPS + 1), range(min(math.floor(times), _MOST_STEPS), 0, -1)
+    legal = [next((plant_rate // n for n in some if plant_rate % n == 0), 0) for some in counts]
+    controls, plants = (" or ".join(f"{rate} Hz" for rate in some if rate) for some in (legal, rates))
+    return (
+        f"control_rate must divide plant_rate, but {plant_rate} Hz is {times:.6g} times {control_rate} Hz; legal and "
+        f"nearest are a control_rate of {controls}, or a plant_rate of {plants}."
+    )
 
 
 def whole_count(seconds: float, rate: int, name: str, units: str, complaints: list[str]) -> int:

@@ -21,6 +21,34 @@ OF_THE_TEST = ("ERR_CONNECTION_REFUSED", "willReadFrequently")
 DESK = {"width": 1280, "height": 720}
 PHONE = {"width": 390, "height": 844}
 
+# Whether a colour (r, g, b) is nearly there in a column of pixels of a chart, at parts (0 .. 1) of its plot's width.
+SEEN = """([chart, parts, colour]) => {
+    const canvas = document.querySelector(`#${chart} canvas`);
+    const over = document.querySelector(`#${chart} .u-over`);
+    const ratio = canvas.width / canvas.clientWidth;
+    const box = ["offsetLeft", "offsetTop", "offsetWidth", "offsetHeight"].map(key => over[key] * ratio);
+    return parts.map(part => {
+        const x = Math.round(box[0] + part * (box[2] - 1));
+        const { data } = canvas.getContext("2d").getImageData(x - 1, box[1], 3, box[3]);
+        let first = null, last = null;
+        for (let i = 0; i < data.length; i += 4) {
+            const off = Math.hypot(...[0, 1, 2].map(c => data[i + c] - colour[c]));
+            if (data[i + 3] > 150 && off < 60) {
+                last = Math.floor(i / 12) / box[3];
+                first ??= last;
+            }
+        }
+        return first === null ? null : [first, last];
+    });
+}"""
+RGB = """name => {
+    const probe = document.body.appendChild(document.createElement("i"));
+    probe.style.color = `var(--${name})`;
+    const rgb = getComputedStyle(probe).color.match(/[\\d.]+/g).map(Number);
+    probe.remove();
+    return rgb;
+}"""
+
 
 def is_complaint(said: Any) -> bool:
     """Tells whether a message on the console is a complaint of the page."""
@@ -35,3 +63,15 @@ def order(stand_in: StandIn, page: Page, act: Callable[[], object]) -> tuple[str
     act()
     expect(page.locator("#said")).not_to_be_empty()
     return [(command["verb"], command["arguments"]) for command in stand_in.commands()][-1]
+
+
+def seen(page: Page, chart: str, parts: list[float], name: str) -> list[tuple[float, float] | None]:
+    """First and last height (0 top .. 1 bottom) at which a colour stands at some parts of the width; None for none."""
+    return page.evaluate(SEEN, [chart, parts, page.evaluate(RGB, name)[:3]])
+
+
+def settled(page: Page, chart: str, text: str) -> None:
+    """Wait until a chart's legend says so: then the snapshot is drawn."""
+    from playwright.sync_api import expect
+
+    expect(page.locator(f"#{chart} .legend")).to_contain_text(text)

@@ -47,8 +47,8 @@ RUNNING = {
     "verdict": "limit-cycle", "verdict_is": "seen",
     "sight": {
         "word": "swinging", "why": "In the last 0.5 s the position crossed its trend line 24 times.", "from_s": 1.0,
-        "to_s": 1.5, "so_far": False, "oscillation_m": 0.00535, "ripple_N": 0.41, "frequency_Hz": 8.25,
-        "stiffness_N_m": 137.2,
+        "to_s": 1.5, "so_far": False, "oscillation_m": 0.00535, "ripple_N": 0.41, "force_swing_N": 0.41,
+        "frequency_Hz": 8.25, "stiffness_N_m": 137.2,
     },
     "verdict_rule": "In the last 0.5 s x crossed its trend line 24 times.",
     "oscillation_m": 0.00535, "displayed_stiffness_N_m": 137.2, "residual_J": 2.1e-18, "moved_J": 6.2e-3,
@@ -117,6 +117,8 @@ class StandIn:
         self._told: dict[str, str] = {}
         self._snapshot: bytes | None = None
         self._sockets: set[web.WebSocketResponse] = set()
+        # A page that has just come gets what was told before, then what is told meanwhile.
+        self._one_at_a_time = asyncio.Lock()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever)
         self._thread.start()
@@ -167,9 +169,7 @@ class StandIn:
     def tell(self, *messages: dict[str, Any]) -> None:
         """Send messages to every page, and to those that come later the last of each type."""
         for message in messages:
-            text = json.dumps(message)
-            self._told[message["type"]] = text
-            self._do(self._send(text))
+            self._do(self._tell(message["type"], json.dumps(message)))
 
     def state(self, **changes: Any) -> None:
         """A running loop, but for some changes."""
@@ -177,8 +177,7 @@ class StandIn:
 
     def show(self, snapshot: bytes) -> None:
         """Send a snapshot to every page."""
-        self._snapshot = snapshot
-        self._do(self._send(snapshot))
+        self._do(self._show(snapshot))
 
     def _do(self, work: Any) -> None:
         asyncio.run_coroutine_threadsafe(work, self._loop).result(20)
@@ -214,11 +213,12 @@ class StandIn:
     async def _stream(self, request: web.Request) -> web.WebSocketResponse:
         socket = web.WebSocketResponse()
         await socket.prepare(request)
-        for text in self._told.values():
-            await socket.send_str(text)
-        if self._snapshot:
-            await socket.send_bytes(self._snapshot)
-        self._sockets.add(socket)
+        async with self._one_at_a_time:
+            for text in self._told.values():
+                await socket.send_str(text)
+            if self._snapshot:
+                await socket.send_bytes(self._snapshot)
+            self._sockets.add(socket)
         async for message in socket:
             if message.type is WSMsgType.TEXT:
                 await self._receive(socket, json.loads(message.data))
@@ -230,9 +230,14 @@ class StandIn:
         if message["type"] == "command" and (answer := self.answer(message)):
             await socket.send_json({"type": "answer", "id": message["id"], "ok": answer[0], "text": answer[1]})
 
-    async def _send(self, message: str | bytes) -> None:
-        for socket in list(self._sockets):
-            if isinstance(message, str):
-                await socket.send_str(message)
-            else:
-                await socket.send_bytes(message)
+    async def _tell(self, kind: str, text: str) -> None:
+        async with self._one_at_a_time:
+            self._told[kind] = text
+            for socket in list(self._sockets):
+                await socket.send_str(text)
+
+    async def _show(self, snapshot: bytes) -> None:
+        async with self._one_at_a_time:
+            self._snapshot = snapshot
+            for socket in list(self._sockets):
+                await socket.send_bytes(snapshot)

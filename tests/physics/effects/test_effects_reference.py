@@ -28,6 +28,7 @@ EVERY_EFFECT = {
 }
 
 
+@pytest.mark.slow
 def test_the_reference_stops_a_sliding_mass_where_and_when_coulomb_friction_does():
     mass, speed, friction = 0.05, 0.1, 0.048
     sliding = scene(device={"mass": mass, "damping": 0.0, "velocity": speed}, friction={"kinetic": friction})
@@ -45,6 +46,7 @@ def test_the_reference_closes_its_own_books_with_every_effect_at_once():
     assert abs(truth.unexplained_J) < 1e-12 * sum(heats.values())
 
 
+@pytest.mark.slow
 def test_without_effects_the_reference_does_what_the_plain_plant_does():
     tap = scene(
         duration=0.2,

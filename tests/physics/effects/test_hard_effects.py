@@ -213,6 +213,7 @@ def test_acceleration_that_changes_its_sign_with_every_sample_is_sound(effects, 
     assert_sound(ran)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damping", [20.0, 500.0])
 @pytest.mark.parametrize("effects", [("transmission",), ("grip",), ("transmission", "grip")], ids="+".join)
 def test_motion_that_decays_below_the_least_normal_number_stays_sound(damping, effects):

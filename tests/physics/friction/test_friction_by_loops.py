@@ -70,15 +70,25 @@ def test_so_has_a_batch_whatever_room_there_is_for_the_pieces(
     expected = by(np.inf, monkeypatch, scenes)
     assert all(result["energy"]["friction_heat_J"] > 1e-5 for result in expected)
     if room:
-        monkeypatch.setattr(loops, "_PIECES", room)
+        monkeypatch.setattr(loops.loops, "_PIECES", room)
     assert by(0, monkeypatch, scenes, batch=True) == expected
+    assert by(0, monkeypatch, scenes) == expected
+
+
+def test_a_step_that_there_is_no_room_for_is_never_taken_for_done(loops: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last place for a piece may be taken by the first of a step that has more."""
+    scene = [scene_of("steps cut into parts")]
+    expected = by(np.inf, monkeypatch, scene)
+    for room in range(2, 34):
+        monkeypatch.setattr(loops.loops, "_PIECES", room)
+        assert by(0, monkeypatch, scene) == expected, room
 
 
 def test_a_rate_in_the_books_that_is_off_by_its_last_bit_is_seen(loops: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     scene, books = [scene_of("a cable and a grip")], segments.LOOPS.module()
-    expected, made = by(np.inf, monkeypatch, scene), books.books_by_step
+    expected, made = by(np.inf, monkeypatch, scene), books.books_by_tick
     off = lambda device: [*device[:3], np.nextafter(device[3], 1.0), *device[4:]]  # noqa: E731
-    monkeypatch.setattr(books, "books_by_step", lambda device, *of: made(off(device), *of))
+    monkeypatch.setattr(books, "books_by_tick", lambda device, *of: made(off(device), *of))
     assert by(0, monkeypatch, scene) != expected
 
 

@@ -134,6 +134,7 @@ def swing_with_friction() -> tuple[Scene, float]:
     return scene(duration=1.0, device=device, hand={"stiffness": k}, friction={"kinetic": f}), end
 
 
+@pytest.mark.slow
 def test_friction_by_tanh_has_an_error_that_no_smaller_step_takes_away():
     swing, end = swing_with_friction()
     errors = [abs(stepped(swing, runge_kutta_4, 1000 * fold, 1e-3 / fold, 1e-3).z[0] - end) for fold in (2, 4, 8)]

@@ -106,6 +106,7 @@ def pressed(method: str, **more: Any) -> Scene:
 STRIBECK = {"kinetic": 0.04, "breakaway": 0.05, "stribeck_velocity": 0.05}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", [{}, {"friction": EFFECTS["friction"]["friction"]}], ids=["smooth", "friction"])
 def test_dop853_agrees_with_the_exact_flow_to_eight_digits(more):
     """With friction through several stops and starts."""
@@ -130,6 +131,7 @@ def test_dop853_follows_a_friction_that_depends_on_the_speed_better_than_the_exa
     assert 1e-9 * np.abs(truth).max() < fine < coarse / 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_all_effects_at_once_run_by_every_method_and_blocks_change_no_bit(method):
     resolved = tap(EFFECTS, duration=0.1, clock={"integrator": method, "round_trip_delay": 0.0013})

@@ -53,6 +53,7 @@ DELAYS = st.lists(
 ).map(lambda pairs: [(0, pairs[0][1]), *sorted(pair for pair in pairs[1:] if pair[0])])
 
 
+@pytest.mark.slow
 @given(DELAYS)
 def test_every_step_feels_the_command_of_the_rule_and_the_books_close(delays):
     assert_by_the_rule(run(changing(delays)), delays)

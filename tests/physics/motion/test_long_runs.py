@@ -65,6 +65,7 @@ def test_an_undamped_swing_keeps_its_energy_to_1e_14_over_a_million_steps():
     assert np.abs(drifting / drifting[0] - 1).max() > 1e-13
 
 
+@pytest.mark.slow
 def test_carrying_the_rounding_along_keeps_the_books_of_a_light_damper_that_plain_addition_loses():
     """Measured: residual over energy moved 1e-16 as it is, which is the rounding of the end state, and 9e-11 with plain
     addition."""
@@ -75,6 +76,7 @@ def test_carrying_the_rounding_along_keeps_the_books_of_a_light_damper_that_plai
     assert relative_residual(resolved, *plainly_added(resolved)) > 1e-12
 
 
+@pytest.mark.slow
 def test_a_damper_too_light_to_move_the_last_bit_of_v_still_heats_and_slows():
     """v loses less than half a unit of its last place a step: added plainly it would coast for ever."""
     resolved = scene(**LIGHT | {"device": {"mass": 1.0, "damping": 4e-13, "velocity": 1.0}})

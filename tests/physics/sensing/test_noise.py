@@ -141,6 +141,7 @@ acts = "always"
 """
 
 
+@pytest.mark.slow
 def test_blocks_processes_and_a_replay_give_the_same_bits_and_counts(tmp_path):
     file = tmp_path / "noisy.toml"
     file.write_text(NOISY, encoding="utf-8")

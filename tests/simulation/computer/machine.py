@@ -142,6 +142,8 @@ class SimChild:
     def rouse(self) -> None:
         """No element hangs here: a signal by which one would be given up finds nothing to do."""
 
+    show_stack = rouse
+
     def kill(self) -> None:
         self._launcher.check()
         if self._run.named_at is None:

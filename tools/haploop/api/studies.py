@@ -93,7 +93,8 @@ def advise(
     """
     from haploop.tools.advise.advice import advice
     from haploop.tools.advise.command import WALLS
-    from haploop.tools.advise.walls.trial import Store, Trial
+    from haploop.tools.advise.walls.store import Store
+    from haploop.tools.advise.walls.trial import Trial
 
     subject = _subject(device, values, plugins, hand=hand, delay=delay, estimator=estimator)
     with _kept(out, WALLS) as walls, Trial(Store(walls), workers, lambda runs: None) as trial:

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 # A column of a block holds about so many numbers: with fewer, calls of NumPy take longer than what they do; more do not
-# stay in the cache.
-BLOCK = 98_304
+# stay in the cache. A chain with friction has some twenty columns, which are gone through twice.
+BLOCK, _PARTS_WITH_FRICTION = 98_304, 4
 # An operand that all members share, or all steps of a tick, is copied into buffers of NumPy's unless these are shorter
 # than a row of members; that triples the time such an operation takes.
 _BUFFER = 512
@@ -108,6 +108,7 @@ class Batch(BatchLoop):
         self._scene_of = np.arange(len(scenes))
         self._ended = np.zeros(len(scenes), bool)
         self._unheeded = 0.0 if scene.friction else _UNHEEDED
+        self._most = BLOCK // (_PARTS_WITH_FRICTION if scene.friction else 1)
         self._schedule(scene)
         self.results: list[Summary | None] = [None] * len(scenes)
 
@@ -116,6 +117,7 @@ class Batch(BatchLoop):
         for tick, event in scene_events(scene, self._time):
             if "swap" in event or "set" in event:
                 self._controller.schedule(tick, event)
+                self._logger.changes.note(tick, event)
                 self._changes.add(tick)
             elif event.get("stop"):
                 self._end = min(self._end, tick)
@@ -150,7 +152,7 @@ class Batch(BatchLoop):
             self._elements = Unchanged(self._controller.params.elements)
         self._in_flight += forces
         waiting = tick + 1 - self._logger.tick
-        if waiting * self._time.steps_per_tick * len(self._ended) >= BLOCK:
+        if waiting * self._time.steps_per_tick * len(self._ended) >= self._most:
             self._book()
         return forces
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from haploop.launch.scene.events import settable_keys
+from haploop.launch.scene.number import Number
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
@@ -17,6 +18,25 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 
+def settable_at(scene: Scene, kinds: Mapping[str, type[Element]]) -> dict[str, Number]:
+    """Returns every key that can be set while this scene is at work, and the number that reads its value."""
+    return settable_keys([element.name for element in scene.dissipation], scene.wall and class_of(scene.wall), kinds)
+
+
+def units_at(scene: Scene, kinds: Mapping[str, type[Element]]) -> dict[str, str]:
+    """Returns the units of a scene's settable keys, and by kind and parameter (``damping.damping``)."""
+    declared = {kind: element.parameters().items() for kind, element in kinds.items()}
+    of_kinds = {f"{kind}.{name}": quantity.unit for kind, each in declared.items() for name, (quantity, _) in each}
+    return of_kinds | {key: number.quantity.unit for key, number in settable_at(scene, kinds).items()}
+
+
+def in_words(scene: Scene, kinds: Mapping[str, type[Element]], values: Mapping[str, Any]) -> dict[str, str]:
+    """Returns values of settable keys, in SI units, with their units; all digits, so that they can be set again."""
+    numbers = settable_at(scene, kinds)
+    words = {key: str(value).lower() if isinstance(value, bool) else str(value) for key, value in values.items()}
+    return {key: f"{word.removesuffix('.0')} {numbers[key].quantity.unit}".strip() for key, word in words.items()}
+
+
 def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> Message:
     """Returns the keys that can be set and the kinds that can be swapped in, as plain values.
 
@@ -24,7 +44,7 @@ def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> Message:
         ``settable``: key -> unit, bounds and present value; ``kinds``: kind -> what it does and its parameters with
         unit, bounds and default; ``elements``: those at work. A bound or default that is not there is None.
     """
-    keys = settable_keys([element.name for element in scene.dissipation], scene.wall and class_of(scene.wall), kinds)
+    keys = settable_at(scene, kinds)
     return {
         "settable": {key: {**number.quantity.as_dict(), "value": value_at(scene, key)} for key, number in keys.items()},
         "kinds": {

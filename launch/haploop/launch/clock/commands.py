@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from haploop.controller.dissipation import ElementError, PluginError
 from haploop.launch.clock import device_time
 from haploop.launch.clock.arguments import check_burden, check_names
-from haploop.launch.clock.capabilities import capabilities
+from haploop.launch.clock.capabilities import capabilities, in_words, units_at
 from haploop.launch.clock.clock import Clock, ClockError
 from haploop.launch.clock.pace import PaceError, pace_of
 from haploop.launch.clock.plugin_swap import swap_plugin
+from haploop.launch.clock.reloads import Code, Reloads
 from haploop.launch.clock.roster import Roster
 from haploop.launch.clock.seen import when_seen
 from haploop.launch.scene.mistakes import SceneError
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from haploop.launch.spec import RunSpec
 
 Done = tuple[str, Message]
-# What a run knows of kinds and their files, by the name of the field of ``RunSpec``.
-Code = dict[str, dict[str, Any]]
 Answer = tuple[bool, str, Message]
 _MOST_TOLD = 5
 _CHANGES = ("swap", "set", "undo")
@@ -39,7 +38,7 @@ _PROBATION = {
 }
 
 
-def in_words(pace: float) -> float | str:
+def pace_in_words(pace: float) -> float | str:
     """Returns a pace as people write it: a number, or ``free``."""
     return "free" if math.isinf(pace) else pace
 
@@ -51,10 +50,10 @@ class Commands:
     """
 
     def __init__(self, clock: Clock, spec: RunSpec, roster: Callable[[], Roster]) -> None:
-        self._clock, self._spec, self._roster = clock, spec, roster
+        self._clock, self._spec, self._roster, self._reloads = clock, spec, roster, Reloads(clock, spec)
         self._rate = spec.scene.clock.control_rate
         self._is_trying = False
-        # Of each change: its event, the change that would take it back, None where none can, and the code before it.
+        # Of each change: its event, the change that would take it back, None where none can, and the code before.
         self._undo_by: list[tuple[Event, Event | None, Code | None]] = []
         self._verbs = {
             "status": self._status,
@@ -79,6 +78,7 @@ class Commands:
         try:
             check_names(verb, act, arguments)
             check_burden(arguments)
+            self._settle()
             done = act(**arguments)
         except Exception as error:
             return _refusal(verb, error)
@@ -107,7 +107,7 @@ class Commands:
             "end": clock.end,
             "control_rate": self._rate,
             "paused": clock.paused,
-            "pace": device_time.PLANT if self._spec.clock == device_time.PLANT else in_words(clock.pace.rate),
+            "pace": device_time.PLANT if self._spec.clock == device_time.PLANT else pace_in_words(clock.pace.rate),
             "lateness": self._lateness(roster),
             "nodes": roster.table(),
             **({"programs": programs} if (programs := roster.provenance()) else {}),
@@ -152,8 +152,8 @@ class Commands:
     def _pace(self, pace: float | str) -> tuple[str, Message]:
         rate = pace_of(pace)
         tick = self._clock.run_at(rate)
-        self._clock.note({"pace": in_words(rate)})
-        return f"pace {in_words(rate)} from {self._at(tick)} on", {"tick": tick}
+        self._clock.note({"pace": pace_in_words(rate)})
+        return f"pace {pace_in_words(rate)} from {self._at(tick)} on", {"tick": tick}
 
     def _stop(self) -> tuple[str, Message]:
         tick = self._clock.stop()
@@ -179,24 +179,19 @@ class Commands:
     def _swap_tried(self, change: Event, at: float | None, reload: bool) -> Generator[None, None, Done]:
         if self._is_trying:
             raise ClockError("The file of another swap is being tried; wait for its answer, then ask again.")
-        self._is_trying, code = True, self._code()
+        self._is_trying = True
         try:
-            tick, before = yield from swap_plugin(self._clock, self._spec, change, at, reload)
+            tick, before, code = yield from swap_plugin(self._clock, self._spec, self._reloads, change, at, reload)
         finally:
             self._is_trying = False
-        return (yield from self._on_probation(self._swapped(change, before, tick, code if reload else None)))
+        return (yield from self._on_probation(self._swapped(change, before, tick, code)))
 
-    def _code(self) -> Code:
-        spec = self._spec
-        return {
-            "kinds": {**spec.kinds}, "plugin_sources": {**spec.plugin_sources}, "plugin_files": {**spec.plugin_files},
-        }  # fmt: skip
+    def _settle(self, withdrawn: Event | None = None) -> None:
+        """Forgets reloads that have failed since, with their code: there is nothing left of them to undo."""
+        self._forget(*self._reloads.settle(withdrawn))
 
-    def _take_code(self, code: Code) -> None:
-        for name, known in code.items():
-            there = getattr(self._spec, name)  # the clock has the same
-            there.clear()
-            there.update(known)
+    def _forget(self, *events: Event) -> None:
+        self._undo_by = [each for each in self._undo_by if not any(each[0] is event for event in events)]
 
     def _on_probation(self, done: Done) -> Generator[None, None, Done]:
         """Returns the answer to a swap to an element that may raise, once it has been at work for a tick."""
@@ -204,7 +199,8 @@ class Commands:
         try:
             text, data = yield from when_seen(self._clock, self._roster, *done, by="controller")
         except ClockError:  # it was refused, and nothing has changed
-            self._undo_by = [each for each in self._undo_by if each[0] is not asked]
+            self._forget(asked)
+            self._settle()
             raise
         return f"{text}\n{_PROBATION[self._spec.scene.run.faulty_swap]}", data
 
@@ -225,9 +221,10 @@ class Commands:
     def _set(self, set: dict[str, float], at: float | None = None) -> tuple[str, Message]:
         before = self._clock.scene_at(self._clock.tick_at(at))
         tick = self._clock.change({"set": set}, at)
-        what = ", ".join(f"{key} = {value}" for key, value in set.items())
         back = {key: value_at(before, key) for key in set}
-        words = " ".join(f"{key}={value}" for key, value in back.items())
+        taken, were = (in_words(before, self._spec.kinds, values) for values in (self._clock.newest["set"], back))
+        what = ", ".join(f"{key} = {value}" for key, value in taken.items())
+        words = " ".join(f'{key}="{value}"' if " " in value else f"{key}={value}" for key, value in were.items())
         self._undo_by.append((self._clock.newest, {"set": back}, None))
         return f"{what} from {self._at(tick)} on; to go back: set {words}", {"tick": tick, "before": {"set": back}}
 
@@ -239,34 +236,25 @@ class Commands:
         if not self._undo_by:
             raise ClockError("There is nothing to undo: no swap and no set that a command asked for is left.")
         asked, back, code = self._undo_by[-1]
-        what = describe(asked)
+        units = units_at(self._clock.present(), self._spec.kinds)
+        what = describe(asked, units)
         if back is None:
             raise ClockError(
                 f"The last change, {what}, cannot be undone: the elements after it have moved up, and no swap puts one "
                 "between others. What was changed before it cannot be undone past it; swap and set still can change it."
             )
         if self._clock.withdraw(asked):
-            if code:
-                self._take_code(code)
+            self._settle(withdrawn=asked)
             text, data = f"{what} will not happen", {}
         else:
-            tick = self._change_back(back, code)
-            text, data = f"{what} is undone: {describe(back)} at {self._at(tick)}", {"tick": tick, **back}
-        self._undo_by.pop()
+            # The file that the kind had before a reload comes back with the element, of whatever kind that is.
+            if code and (former := code[asked["swap"]["kind"]]) and former[2]:
+                tick, _ = self._reloads.change(back, None, code, former[2])
+            else:
+                tick = self._clock.change(back)
+            text, data = f"{what} is undone: {describe(back, units)} at {self._at(tick)}", {"tick": tick, **back}
+        self._forget(asked)
         return text, data
-
-    def _change_back(self, back: Event, code: Code | None) -> int:
-        """Schedules what undoes a change, with the file that its element had before a reload; returns the tick."""
-        if code is None:
-            return self._clock.change(back)
-        now, file = self._code(), code["plugin_files"].get(back["swap"]["kind"])
-        self._take_code(code)
-        extra: dict[str, Any] = {"plugin": str(file.resolve())} if file else {}
-        try:
-            return self._clock.change(back, **extra)
-        except Exception:
-            self._take_code(now)
-            raise
 
 
 def _refusal(verb: str, error: Exception) -> Answer:

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from haploop.launch.clock.clock import Clock, ClockError
+from haploop.launch.clock.reloads import Code, Reloads
 from haploop.launch.processes.plugin_trial import PluginTrial, read_source
 from haploop.launch.spec import keep_plugin
 from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import ElementTable
 
 if TYPE_CHECKING:
-    from haploop.controller.dissipation import Element
     from haploop.launch.spec import RunSpec
 
 
 def swap_plugin(
-    clock: Clock, spec: RunSpec, change: Event, at_s: float | None, reload: bool
-) -> Generator[None, None, tuple[int, Sequence[ElementTable]]]:
+    clock: Clock, spec: RunSpec, reloads: Reloads, change: Event, at_s: float | None, reload: bool
+) -> Generator[None, None, tuple[int, Sequence[ElementTable], Code | None]]:
     """Schedules the swap once its element has been made and has given a force at rest, elsewhere.
 
-    Returns the tick and the elements before it.
+    Returns the tick and the elements before it, and after a reload what the code of its kinds was.
 
     Yields while the trial goes on, so that time does. Whatever becomes of the trial, this process has not run the file;
     where anything fails, nothing has changed.
@@ -50,26 +49,14 @@ def swap_plugin(
         yield from trial.make([event.swap])
     before = clock.scene_at(clock.tick_at(at_s)).dissipation
     if not reload:
-        return clock.change(change, at_s), before
-    return _taken_up(clock, spec, change, at_s, (source, text, found)), before
-
-
-def _taken_up(
-    clock: Clock, spec: RunSpec, change: Event, at_s: float | None, tried: tuple[Path, str, dict[str, type[Element]]]
-) -> int:
-    source, text, found = tried
-    before: dict[str, Any] = dict(spec.kinds)
+        return clock.change(change, at_s), before, None
     there = set(spec.plugin_files.values())
     kept = keep_plugin(source, spec.out, text.encode())
-    spec.kinds.update(found)
     try:
-        tick = clock.change(change, at_s, plugin=str(kept.resolve()))
+        code: Code = {each: (element, source, kept) for each, element in found.items()}
+        tick, former = reloads.change(change, at_s, code, kept)
     except Exception:
-        spec.kinds.clear()
-        spec.kinds.update(before)
         if kept not in there:
             kept.unlink(missing_ok=True)
         raise
-    for each in found:
-        spec.plugin_sources[each], spec.plugin_files[each] = source, kept
-    return tick
+    return tick, before, former

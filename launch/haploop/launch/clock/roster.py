@@ -131,8 +131,8 @@ class Roster:
         return min((node.tick for node in self.nodes.values() if node.lossless and not node.done), default=0)
 
     def followers(self) -> list[Node]:
-        """Returns the observers that may miss nothing and have begun to follow."""
-        return [node for node in self.nodes.values() if not node.is_own and node.lossless and node.ready]
+        """Returns the logger, until it is done, and the observers that may miss nothing and have begun to follow."""
+        return [node for node in self.nodes.values() if node.lossless and node.ready and not node.done]
 
     def loop_tick(self) -> int | None:
         """Returns the tick up to which a pace takes the loop as done: the plant's; None before it has joined.

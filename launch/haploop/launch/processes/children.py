@@ -93,6 +93,10 @@ class Child:
         """Has a controller that hangs in an element's code give that up, and say where it was."""
         self._process.send_signal(signal.SIGUSR1)
 
+    def show_stack(self) -> None:
+        """Has a controller that no ``rouse`` could reach, in compiled code, show where it is."""
+        self._process.send_signal(signal.SIGUSR2)
+
     def let_go(self) -> None:
         """Lets a process end that has said DONE; one of somebody else's ends by itself."""
         if self._process.stdin and not self._group:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 
 from haploop.launch.clock.clock import Clock
@@ -17,6 +18,8 @@ from haploop.protocol.transport.machine import Machine
 LAST_WORDS_S = 1.0
 # Attached nodes that say nothing are asked this often whether they are still there.
 _PROBE_S = 0.2
+# A controller that says nothing for longer, s, is told of, though its deadline may be far.
+_TOLD_AFTER_S = 5.0
 # When the launcher itself was held up for longer (stopped, swapped out, loading a plugin), nobody is blamed for it.
 _HELD_UP_S = 1.0
 
@@ -36,7 +39,10 @@ class Deadlines:
         self._standstill = Standstill(server.roster, clock, self._deadline_s)
         self._started = self._looked = machine.now()
         self._probe_due = 0.0
-        self._roused: dict[tuple[str, float], float] = {}  # role and when it was last heard of -> when it was roused
+        # By when the controller was last heard of: when it was roused; whether its silence was told, its stack shown.
+        self._roused: dict[float, float] = {}
+        self._told: set[float] = set()
+        self._shown: set[float] = set()
         self._strain = Strain()
 
     def check(self) -> None:
@@ -52,15 +58,21 @@ class Deadlines:
         for node in roster.nodes.values():
             if node.is_gone and roster.is_external(node.role) and not node.done:
                 raise RunFailed(f"The {roster.label(node.role)} is gone; {self.where()}")
-        if self._spec.programs:
+        if self._spec.programs or self._server.results:  # once one is done, others may wait for what never comes
             self._standstill.check(now)
         # Nodes may still load and a machine be busy with it; the deadline of the scene is that of a loop that runs.
-        deadline_s = self._deadline_s if roster.common_tick() else max(self._deadline_s, START_DEADLINE_S)
-        for node in roster.silent(now, self._deadline_s / 2):
+        start_s = self._deadline_s if roster.common_tick() else max(self._deadline_s, START_DEADLINE_S)
+        for node in roster.silent(now, min(self._deadline_s / 2, _TOLD_AFTER_S)):
             if not node.is_own:
                 continue
             pid = self._children[node.role].pid if node.role in self._children else NOBODY
             self._strain.note(pid, node.heard, now)
+            # Once all are ready haploop's own controller has loaded all: it is at its first ticks, or tells of waiting.
+            is_ours = node.role == "controller" and not roster.is_external(node.role)
+            is_at_work = is_ours and roster.all_own("ready")
+            deadline_s = self._deadline_s if is_at_work else start_s
+            if is_at_work:
+                self._tell(node, now)
             if now - node.heard > deadline_s and not self._may_rouse(node, now):
                 ended = "given up" if roster.is_external(node.role) else "ended"
                 raise RunFailed(
@@ -68,6 +80,15 @@ class Deadlines:
                     f"{self.where()}{self._strain.told(pid, now)} A longer wait can be set with run.deadline."
                 )
         self._check_observers(now)
+
+    def _tell(self, node: Node, now: float) -> None:
+        """Tells once of a silence that goes on, where the deadline is far: somebody waits at a terminal."""
+        if _TOLD_AFTER_S < now - node.heard < self._deadline_s and node.heard not in self._told:
+            self._told.add(node.heard)
+            label, limit_s = self._server.roster.label(node.role), self._deadline_s
+            print(
+                f"The {label} has not answered for {_TOLD_AFTER_S:g} s; run.deadline is {limit_s:g} s.", file=sys.stderr
+            )
 
     def _look(self) -> tuple[float, Roster]:
         """Returns the wall time, s, and the roster, in which nobody is blamed for what held the launcher itself up."""
@@ -95,11 +116,13 @@ class Deadlines:
         """Rouses a controller that hangs, once; tells whether a last word of it may still come."""
         if node.role != "controller" or node.role in self._spec.programs:
             return False
-        silence = (node.role, node.heard)
-        if silence not in self._roused:
-            self._roused[silence] = now
+        roused = self._roused.setdefault(node.heard, now)
+        if roused == now:
             self._children[node.role].rouse()
-        return now - self._roused[silence] < LAST_WORDS_S
+        elif now - roused > LAST_WORDS_S / 2 and node.heard not in self._shown:
+            self._shown.add(node.heard)
+            self._children[node.role].show_stack()
+        return now - roused < LAST_WORDS_S
 
     def where(self) -> str:
         """Returns how far all nodes had come, a sentence's end."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 
 # Roles that a program of somebody else's can take; the logger is what judges it.
 ROLES = ("plant", "controller")
@@ -37,9 +38,13 @@ class Program:
 
     @property
     def label(self) -> str:
-        """The role and its program, for people."""
-        command = self.command if len(self.command) <= _LONGEST_TOLD else f"{self.command[:_LONGEST_TOLD]} ..."
-        return f"{self.role} ({command or 'external'})"
+        """The role and its program, for people; of a long command files without their directories."""
+        told = self.command or "external"
+        if len(told) > _LONGEST_TOLD:
+            told = " ".join(PurePath(word).name if word.startswith("/") else word for word in self.words)
+        if len(told) > _LONGEST_TOLD:
+            told = f"{told[:_LONGEST_TOLD]} ..."
+        return f"{self.role} ({told})"
 
 
 def seat_file(role: str) -> str:

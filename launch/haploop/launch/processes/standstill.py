@@ -1,4 +1,4 @@
-"""Programs of others that let no tick be done: a run ends that has one as its part, and goes on without an observer."""
+"""Runs that stand still: one ends where its own nodes let no tick be done, and goes on without an observer."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def late_observers(
 
 
 class Standstill:
-    """Watches that what is granted is done, which haploop's own nodes see to, but a program of another's may not.
+    """Watches that what is granted is done, and that what was done reaches the others, the end of a run included.
 
     Args:
         deadline_s: how long nothing may be done once a tick has been.
@@ -61,11 +61,13 @@ class Standstill:
         if not is_due or seen != self._seen or any(node.is_own for node in roster.silent(now, self._deadline_s / 2)):
             self._seen, self._since = seen, now
             return
-        deadline_s = self._deadline_s if roster.common_tick() else max(self._deadline_s, START_DEADLINE_S)
+        has_begun = roster.common_tick() or any(node.done for node in own)
+        deadline_s = self._deadline_s if has_begun else max(self._deadline_s, START_DEADLINE_S)
         if now - self._since > deadline_s:
+            owed = " protocol/README.md says what a node owes the others." if roster.others_than("") else ""
             raise RunFailed(
-                f"For {deadline_s:g} s no tick was done, though all nodes speak: {'; '.join(map(self._told, own))}. "
-                "protocol/README.md says what a node owes the others."
+                f"For {deadline_s:g} s no tick was done, though all nodes speak: {'; '.join(map(self._told, own))}."
+                + owed
             )
 
     def _told(self, node: Node) -> str:

@@ -81,7 +81,7 @@ class Loop:
         self._plant, self._controller = Plant(scene, time), Controller(scene, time, kinds)
         self._scene, self._session = scene, session
         self._end = time.ticks
-        self._block = BlockLength(scene.run.block_ticks)
+        self._block = BlockLength(time.block_ticks(scene.run))
         session.logger.start(self._plant.state(), [])
 
     def schedule(self, events: list[tuple[int, Event]]) -> None:

@@ -18,7 +18,7 @@ from haploop.launch.scene.events import check_events
 from haploop.launch.scene.layers import KeyPath, Layers
 from haploop.launch.scene.mistakes import Mistake, SceneError
 from haploop.launch.scene.models import Model, number_of, read_table, scene_model
-from haploop.launch.scene.schema import Schema, alternatives, schema_at, whole_schema
+from haploop.launch.scene.schema import Schema, alternatives, keys_of_all, schema_at, whole_schema
 from haploop.launch.scene.toml_writer import inline
 from haploop.launch.scene.unmodelled import check_hand
 from haploop.launch.scene.wall_keys import check_spring, check_wall, with_defaults
@@ -140,7 +140,7 @@ def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:
         return Timebase.from_clock(table, duration)
     except TimebaseError as error:
         clock = table.as_dict()
-        for sentence in str(error).splitlines():
+        for sentence in str(error).splitlines():  # each begins with its key
             name = sentence.split()[0]
             key, value = (("clock", name), clock[name]) if name in clock else ((name,), duration)
             layers.complain(key, f"The {sentence}", f"is {inline(value)}")
@@ -161,17 +161,37 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
         case "union_tag_not_found":
             allowed = alternatives(schema, rule)
             layers.complain((*key, "kind"), f"Allowed: {', '.join(allowed)}.", "is missing")
+            _complain_of_keys(layers, key, schema, rule)
         case "union_tag_invalid" | "literal_error":
             key = (*key, "kind") if what == "union_tag_invalid" else key
             allowed = alternatives(schema, rule)
             layers.complain(key, f"Allowed: {', '.join(allowed)}.", None, nearest(layers.value(key), allowed))
+            if what == "union_tag_invalid":
+                _complain_of_keys(layers, key[:-1], schema, rule)
         case "sentence":
             given = "does not fit together" if isinstance(layers.value(key), dict) else None
             layers.complain(key, message, given)
         case "list_type" if isinstance(layers.value(key), dict):
             layers.complain(key, f"It must be a list of tables: [[{key[-1]}]], two pairs of brackets.", "is one table")
+        case "model_type" | "model_attributes_type" | "dict_type" if _is_list_of_tables(layers.value(key)):
+            layers.complain(key, f"It must be one table: [{key[-1]}], one pair of brackets.", "is a list of tables")
         case _:
             layers.complain(key, _FORMS.get(what, f"{message}."))
+
+
+def _is_list_of_tables(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(one, dict) for one in value)
+
+
+def _complain_of_keys(layers: Layers, table: KeyPath, schema: Schema, rule: Schema) -> None:
+    """Adds a mistake for every key of a table without a known kind that no kind has."""
+    keys = keys_of_all(schema, rule)
+    for name in layers.value(table):
+        if name not in keys:
+            allowed = ", ".join(keys)
+            layers.complain(
+                (*table, name), f"Keys of some kind: {allowed}.", "is a key of no kind", nearest(name, keys)
+            )
 
 
 def _of_a_device(layers: Layers, key: KeyPath) -> str:

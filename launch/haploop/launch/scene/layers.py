@@ -10,11 +10,12 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from haploop.launch.scene.bundled import found
+from haploop.launch.scene.bundled import bundled, found
 from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, counted, shown
 from haploop.launch.scene.reading.lines import KeyPath, line_in
 from haploop.launch.scene.reading.tables import DEEPEST, excess, parse
 from haploop.launch.scene.toml_writer import inline
+from haploop.protocol.names import nearest
 from haploop.protocol.scene.table import Tables
 
 # No scene needs more files that extend one another.
@@ -148,8 +149,24 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
         layers.mistakes.append(Mistake(shown(path), "extends", f"is {_quoted(below)}", expected, line=line))
         return
     for name in names:
-        _read(layers, found(Path(name), "scenes", path.parent), (*chain, here))
+        file = found(Path(name), "scenes", path.parent)
+        if os.path.lexists(file):
+            _read(layers, file, (*chain, here))
+        else:
+            line = line_in(str(path), ("extends",))
+            layers.mistakes.append(Mistake(shown(path), "extends", *_absent(name, path.parent), line=line))
     layers.lay(table, str(path))
+
+
+def _absent(name: str, folder: Path) -> tuple[str, str, str | None]:
+    """Returns what was found and expected of a name that is no file, and the nearest of those that are."""
+    own = {file.name for file in folder.glob("*.toml")}
+    theirs = {f"{kind}/{one}.toml" for kind in ("devices", "hands", "scenes") for one in bundled(kind)}
+    meant = nearest(name if name.endswith(".toml") else f"{name}.toml", sorted(own | theirs))
+    if meant is None and (stem := nearest(Path(name).stem, [Path(one).stem for one in sorted(theirs)])):
+        meant = next(one for one in sorted(theirs) if Path(one).stem == stem)
+    expected = "It must be a file, looked for beside this one, or the name of one that comes with haploop."
+    return f"names {_quoted(name)}, but there is no such file", expected, meant
 
 
 def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:

@@ -219,7 +219,24 @@ def _convert(amount: Decimal, unit: str, target: str) -> Decimal:
     return amount * (given[1] / wanted[1])
 
 
+# Quantities by their dimension, for whom N s/m says more than [mass] / [time].
+_QUANTITIES = {
+    "[length]": "a length",
+    "[mass]": "a mass",
+    "[time]": "a time",
+    "1 / [time]": "a rate",
+    "[length] / [time]": "a speed",
+    "[length] / [time] ** 2": "an acceleration",
+    "[mass] / [time]": "a damping",
+    "[mass] / [time] ** 2": "a stiffness",
+    "[length] * [mass] / [time] ** 2": "a force",
+}
+
+
 def _another_dimension(unit: str, dimension: object, target: str, wanted: object) -> str:
+    given, named = _QUANTITIES.get(str(dimension)), _QUANTITIES.get(str(wanted))
+    if given and named:
+        return f"{unit} is {given}, but {target} is {named}."
     return f"{unit or 'A bare number'} has the dimension {dimension}, but {target or 'a bare number'} has {wanted}."
 
 

@@ -87,6 +87,12 @@ def alternatives(schema: Schema, rule: Schema) -> list[str]:
     return [name if isinstance(name, str) else str(name).lower() for name in names]
 
 
+def keys_of_all(schema: Schema, rule: Schema) -> list[str]:
+    """Returns the keys that a table of any kind may have where ``rule`` rules, each once."""
+    tables = [_chosen(schema, choice, None) for choice in rule.get("anyOf", ())]
+    return list(dict.fromkeys(key for table in tables for key in table.get("properties", ())))
+
+
 def _chosen(schema: Schema, node: Schema, data: Any) -> Schema:
     """Follows a reference; of alternatives takes the one whose kind ``data`` names."""
     if "$ref" in node:

@@ -25,6 +25,8 @@ _ALIKE_S = 4.0
 _WIDER = 1.2
 # A frequency is known from so many periods on.
 _SEEN_PERIODS = 6.0
+# A run of more than this is asked of nobody.
+_LONGEST_S = 3600.0
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
 _COUNTS = 10
 
@@ -32,8 +34,8 @@ WHY = {
     "diverged": "The run ended by itself: {detail}.",
     "no contact": "No tick of the last half second, or of the second half of a shorter run, was in contact.",
     "rest": "After a push of {push_N:.3g} N it came to rest.",
-    "unfelt": "After a push of {push_N:.3g} N it came to rest but for {width_um:.3g} um peak to peak at "
-    "{frequency_Hz:.3g} Hz, less than a hand feels ({felt_um:.3g} µm).",
+    "unfelt": "After a push of {push_N:.3g} N it came to rest but for {width_um:.3g} um peak to peak, most at "
+    "{frequency_Hz:.3g} Hz: less than a hand feels.",
     "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width_mm:.3g} mm peak to peak at "
     "{frequency_Hz:.3g} Hz.",
     "lasts": "Swings of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, growing "
@@ -46,7 +48,7 @@ WHY = {
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
     "too slow": "Of its swings of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz the steadier changes by "
     "{rate_1_s:.2g} +- {error_1_s:.2g} 1/s, too slowly, or too unlike the other, to tell within {watched_s:g} s; "
-    "some {about_s:.0f} s might tell.",
+    "{run} might tell.",
 }
 # What is said beside that after a blow, and how the words for its finding are told.
 AFTER_BLOW = {
@@ -131,8 +133,9 @@ class Finding:
         """Returns why, with its numbers."""
         numbers = {name: math.nan if value is None else value for name, value in vars(self).items()}
         sizes = {"width_mm": 1e3 * self.width_m, "width_um": 1e6 * self.width_m}
-        sizes["about_s"] = float(f"{numbers['needs_s']:.2g}")
-        sentence = WHY[self.why].format(**numbers, **sizes, felt_um=2e6 * smallest_felt_m(self.frequency_Hz))
+        about_s = float(f"{numbers['needs_s']:.2g}")
+        run = f"some {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
+        sentence = WHY[self.why].format(**numbers, **sizes, run=run)
         return sentence + (AFTER_BLOW[self.blown].format(**numbers) if self.blown else "")
 
 
@@ -154,7 +157,7 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     rising = any(change > max(_LASTING, 3 * error) for change, error in changes)
     falling = max(swing.changes) < -_LASTING and (size_m < _SMALL_M or (is_long and covers))
     forgets = swing.lasts(_LASTING) and SAME[0] < swing.at_last < SAME[1] and not 0.5 < swing.at_first < 2.0
-    unfelt = not is_felt(swing.width_m, swing.frequency_Hz)
+    unfelt = swing.times_felt < 1.0 and not is_felt(swing.width_m, swing.frequency_Hz)
     seen = swing.frequency_Hz * swing.watched_s >= _SEEN_PERIODS or not is_felt(swing.moved_m, swing.frequency_Hz)
     goes_on = not (falling or size_m <= 2.0 * swing.count_m or (forgets and covers))
     if unfelt and seen and not rising and not goes_on:
@@ -180,7 +183,7 @@ def decide(swing: Swing, *, last: bool) -> Finding:
 
 
 def _finding(swing: Swing, word: str, why: str) -> Finding:
-    felt_m = 2.0 * smallest_felt_m(swing.frequency_Hz)
+    felt_m = 2.0 * float(smallest_felt_m(swing.frequency_Hz))
     pairs = [*zip(swing.changes, swing.errors, strict=True)]
     most_1_s = max(abs(change) + 2.0 * error for change, error in pairs) / (swing.watched_s / 2.0)
     needs_s = None
@@ -194,5 +197,5 @@ def _finding(swing: Swing, word: str, why: str) -> Finding:
     frequency_Hz, ripple_N = (0.0, 0.0) if swing.width_m < REST_M else (swing.frequency_Hz, swing.ripple_N)
     return Finding(
         word, why, swing.push_N, swing.watched_s, swing.rate_1_s, swing.error_1_s, frequency_Hz, swing.width_m,
-        swing.spread_m, ripple_N, swing.width_m >= felt_m, None, needs_s, most_1_s,
+        swing.spread_m, ripple_N, swing.times_felt >= 1.0 or swing.width_m >= felt_m, None, needs_s, most_1_s,
     )  # fmt: skip

@@ -25,6 +25,7 @@ _LEAST_TICKS = 240
 # A third copy, pushed harder by this share, shows whether the swing is chaotic: whether it ends apart from the second
 # by this share of the width.
 BESIDE, _APART = 1e-3, 0.2
+_LINEAR = ("damping", "bidirectional-inertia")
 
 
 def watch_times(time: Timebase, delay_steps: int, looks_s: Sequence[float]) -> list[float]:
@@ -97,17 +98,21 @@ def findings(
     inside = _is_inside(wall, small[:, -quarter:]) & _is_inside(wall, large[:, -quarter:])
     stays = _is_inside(wall, small[:, half:], np.all) & _is_inside(wall, large[:, half:], np.all)
     count_m = np.array([scene.encoder.resolution if scene.encoder else 0.0 for scene in scenes])
-    smooth = np.array([_is_smooth(scene) for scene in scenes])
+    smooth = np.array([is_smooth(scene) for scene in scenes])
     pushed = Pushed(small, large, command, np.abs(push_N), count_m, inside, stays, smooth)
     swings = measure(pushed, time.control_rate)
     return [decide(swing, last=last) for swing in swings]
 
 
-def _is_smooth(scene: Scene) -> bool:
-    """Tells whether nothing but the encoder rounds, nothing saturates, and no estimator filters small swings more."""
+def is_smooth(scene: Scene) -> bool:
+    """Tells whether nothing but the encoder rounds, nothing saturates, and no estimator filters small swings more.
+
+    Nor may an element behind an encoder be other than linear: one count may switch all of its force on.
+    """
     limits = [
         (table.resolution, getattr(table, "saturation", None))
         for table in (scene.actuator, scene.accelerometer)
         if table
     ]
-    return not any(map(any, limits)) and scene.estimate("velocity").estimator != "foaw"
+    switches = scene.encoder and any(element.kind not in _LINEAR for element in scene.dissipation)
+    return not (switches or any(map(any, limits)) or scene.estimate("velocity").estimator == "foaw")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Iterator
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.launch.stability.traces import frequency_Hz, sizes, trend, widths
-from haploop.logger.verdict.ripple import ripple
+from haploop.launch.stability.traces import frequency_Hz, most_felt, sizes, smallest_felt_m, trend, widths
+from haploop.logger.verdict.ripple import RIPPLE_ABOVE_HZ, above, ripple
 
 # Pieces in which the width of a swing is measured, and the periods that one covers at least.
 PIECES, FEW_PIECES = 24, 8
@@ -18,6 +20,8 @@ LEAST_PERIODS = 2.0
 _PHASE, _UNSURE = 6.0, (1e-4, 1.0)
 # A swing this small is rounding: a thousand atoms would be wider.
 REST_M = 1e-9
+# A slow swing within this many counts of the encoder, or this wide, is no motion that could make a fast one.
+_CREEP, _CREEP_M = 3.0, 20e-6
 # Sizes whose ratio lies between these are the same; those of the pushes differ by ten.
 SAME = (0.7, 1.43)
 
@@ -57,6 +61,7 @@ class Swing(NamedTuple):
         at_first, at_last: width after the larger push over that after the smaller, in the first piece and at the last.
         frequency_Hz: of the end.
         covers_periods: periods that a piece covers.
+        times_felt: how strong the last quarter of either is, in terms of what is felt.
     """
 
     watched_s: float
@@ -78,6 +83,7 @@ class Swing(NamedTuple):
     frequency_Hz: float
     ripple_N: float
     covers_periods: float
+    times_felt: float
 
     def lasts(self, within: float) -> bool:
         """Tells whether both swings neither grow nor decay, as far as their scatter lets one say."""
@@ -94,21 +100,37 @@ class Swing(NamedTuple):
 def measure(pushed: Pushed, rate: float) -> list[Swing]:
     """Returns the measures of each loop, worked out as if it were alone; slow swings in fewer, longer pieces.
 
+    Of one that rests but for a slow swing that no hand feels, and a fast one that it does, the fast one is measured.
+
     ``rate``: ticks a second.
     """
     ticks = pushed.large.shape[-1]
     frequency = frequency_Hz(pushed.large[:, ticks // 2 :], rate)
+    last = np.stack([pushed.small, pushed.large])[..., -ticks // 4 :]
+    of_copies, most_Hz = most_felt(last, rate)
+    harder = of_copies.argmax(axis=0)[None]
+    times_felt, fast_Hz = (np.take_along_axis(each, harder, axis=0)[0] for each in (of_copies, most_Hz))
+    moved_m = np.ptp(last, axis=-1).max(axis=0)
+    rests = (moved_m < 2.0 * smallest_felt_m(frequency)) & (moved_m < np.maximum(_CREEP * pushed.count_m, _CREEP_M))
+    is_buried = (times_felt >= 1.0) & rests & (fast_Hz > RIPPLE_ABOVE_HZ)
+    frequency = np.where(is_buried, fast_Hz, frequency)
     is_slow = ticks // PIECES * frequency / rate < LEAST_PERIODS
     found: dict[int, Swing] = {}
-    for pieces, which in ((PIECES, ~is_slow), (FEW_PIECES, is_slow)):
-        places = np.flatnonzero(which)
+    for slow, buried in product((False, True), repeat=2):
+        places = np.flatnonzero((is_slow == slow) & (is_buried == buried))
         if len(places):
             some = Pushed(*(part[places] for part in pushed))
-            found |= zip(places.tolist(), _measured(some, rate, frequency[places], pieces), strict=True)
+            if buried:
+                some = some._replace(small=above(some.small, rate), large=above(some.large, rate))
+            rows = _measured(some, rate, frequency[places], times_felt[places], FEW_PIECES if slow else PIECES)
+            found |= {place: Swing(ticks / rate, *row) for place, row in zip(places.tolist(), rows, strict=True)}
     return [found[place] for place in range(len(frequency))]
 
 
-def _measured(pushed: Pushed, rate: float, frequency: np.ndarray, pieces: int) -> list[Swing]:
+def _measured(
+    pushed: Pushed, rate: float, frequency: np.ndarray, times_felt: np.ndarray, pieces: int
+) -> Iterator[tuple[Any, ...]]:
+    """Returns of each loop what its ``Swing`` holds after the time."""
     small_x, large_x, command, *of_each = pushed
     ticks = large_x.shape[-1]
     size, last_half, last_quarter = ticks // pieces, slice(ticks // 2, None), slice(-ticks // 4, None)
@@ -135,6 +157,6 @@ def _measured(pushed: Pushed, rate: float, frequency: np.ndarray, pieces: int) -
         frequency,
         ripple(command[:, last_quarter], rate),
         covers,
+        times_felt,
     ]
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    return [Swing(ticks / rate, *row) for row in rows]
+    return zip(*(column.tolist() for column in columns), strict=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -18,6 +19,8 @@ class ElementError(Exception):
 
 _HERE = Path(__file__).parent
 _NO_PLUGIN = (_HERE.parent, _HERE / "registry.py")
+# A run keeps a copy of each plugin under its name with a digest: people are told the name that they gave.
+_KEPT = re.compile(r"-[0-9a-f]{12}(?=\.py$)")
 
 
 def places_of(error: BaseException | None) -> list[tuple[str, int]]:
@@ -36,11 +39,13 @@ def place_in(kind: type[Element] | None, error: BaseException | None = None) -> 
     code = getattr(getattr(kind, "force", None), "__code__", None)
     places = places_of(error) or ([(code.co_filename, code.co_firstlineno)] if code else [])
     lines = [line for file, line in places if file == places[0][0]]
-    return f" ({Path(places[0][0]).name}, line {lines[-1]})" if lines else ""
+    return f" ({_KEPT.sub('', Path(places[0][0]).name)}, line {lines[-1]})" if lines else ""
 
 
 def raised(error: BaseException | None, kind: type[Element] | None = None) -> str:
     """Returns what an element raised, with the file and the line of its code."""
+    if kind and kind.memory is not None and "unpack" in str(error) and not places_of(error):
+        return f"TypeError: force must return the force and the memory, as in: return f, memory{place_in(kind)}"
     return f"{type(error).__name__}: {error}{place_in(kind, error)}"
 
 

@@ -61,26 +61,28 @@ class ChainBooks:
     ) -> Iterator[np.ndarray]:
         """Yields the energy each interval adds to each book, J; see ``OneMassBooks.increments``."""
         dx = moved.by_step.reshape(-1, *moved.by_step.shape[2:])
-        for book in self.by_step(first_step, columns, dx, commanded):
-            yield sum_steps(by_interval(book, self._n))
+        loops = LOOPS.module_for(dx.size) if dx.ndim == 1 or self._rubs else None
+        if loops and (found := self._by_loops(loops, first_step, columns, len(dx), commanded)) is not None:
+            yield from found.reshape(-1, *moved.by_tick.shape)
+        else:
+            for book in self.by_step(first_step, columns, dx, commanded):
+                yield sum_steps(by_interval(book, self._n))
 
     def by_step(
         self, first_step: int, columns: BatchColumns, dx: np.ndarray, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
         """Yields the energy each step adds to each book, J, shape (steps,), or (steps, batch), each."""
         tau = self._tau.at_steps(first_step, first_step + len(dx) + 1)
-        loops = LOOPS.module_for(dx.size) if dx.ndim == 1 or self._rubs else None
-        if loops and (found := self._by_loops(loops, first_step, columns, tau, dx.size // len(dx))) is not None:
-            return self._completed(found.reshape(-1, *dx.shape), columns["force"][:-1], dx, commanded)
         if "pieces" not in columns or not len(columns["pieces"][0]):
             return self._of_run(first_step, columns, tau, dx, commanded)
         return self._with_cut_steps(first_step, columns, tau, dx, list(commanded))
 
     def _by_loops(
-        self, loops: Any, first_step: int, columns: BatchColumns, tau: np.ndarray, members: int
+        self, loops: Any, first_step: int, columns: BatchColumns, steps: int, commanded: Iterable[np.ndarray]
     ) -> np.ndarray | None:
-        """Returns what ``books_by_step`` of the loops does; None where these cannot serve."""
-        chain, steps = self._chain, len(tau) - 1
+        """Returns the books, tick by tick, by the loops; None where these cannot serve."""
+        tau = self._tau.at_steps(first_step, first_step + steps + 1)
+        chain, members = self._chain, columns["x"].size // len(columns["x"])
         names = [*chain.states, *(f"{name}_low" for name in chain.positions), "friction", "stuck"]
         places, some, of_pieces = columns.get("pieces") or ([0], [len(columns.get(f"{PIECES}step", ()))], columns)
         counts, none = np.zeros(members, np.int64), np.zeros(0)
@@ -90,27 +92,22 @@ class ChainBooks:
         kinds = np.unique((2.0 * pieces[-2] + pieces[len(names) - 1]).astype(np.int64))
         if (forms := self._forms.for_loops(kinds, loops)) is None:
             return None
-        rows = np.empty((len(names) + 2, steps + 1, members))
+        rows = np.empty((len(names) + 3, steps + 1, members))
         for row, name in zip(rows, (*names, "force"), strict=False):
             row[:] = columns[name].reshape(steps + 1, -1) if name in columns else 0.0
-        rows[-1] = tau.reshape(steps + 1, -1)
+        rows[-2], rows[-1] = tau.reshape(steps + 1, -1), 0.0
+        if self._is_limited:
+            rows[-1, :-1] = beyond_limits(commanded, columns["force"][:-1]).reshape(steps, -1)
         constants = [*self._constant.values()]
         held_N = np.array([*constants, sum(constants)] if constants else [])
         device = [np.array(chain.masses_kg), np.array([link.stiffness for link in chain.links]), np.array(chain.spring)]
         first = np.append(0, np.cumsum(counts))
-        books = len(self._forms.names) + 3 + len(constants)
-        return loops.books_by_step([*device, *forms], rows, pieces, first, held_N, books)
-
-    def _completed(
-        self, found: np.ndarray, force: np.ndarray, dx: np.ndarray, commanded: Iterable[np.ndarray]
-    ) -> Iterator[np.ndarray]:
-        """Yields the books that the loops have found, with what the limits of the actuator keep from the device."""
-        lags = len(self._forms.names) - 1 - len(self._heats)
-        friction = 1 + len(self._heats) + lags
-        yield from (*found[: 1 + len(self._heats)], *found[friction + (not self._rubs) : friction + 3])
-        if self._is_limited:
-            yield (found[friction - 1] if lags else 0.0) + beyond_limits(commanded, force) * dx
-        yield from found[friction + 3 :]
+        heats = len(self._heats)
+        lags, books = len(self._forms.names) - 1 - heats, len(self._forms.names) + 4 + len(constants)
+        found = loops.books_by_tick([*device, *forms], rows, pieces, first, held_N, books, steps // self._n, lags > 0)
+        friction = 1 + heats + lags
+        kept = [*range(1 + heats), *range(friction + (not self._rubs), friction + 3)]
+        return found[[*kept, *[books - 1] * self._is_limited, *range(friction + 3, books - 1)]]
 
     def _with_cut_steps(
         self, first_step: int, columns: BatchColumns, tau: np.ndarray, dx: np.ndarray, commanded: list[np.ndarray]

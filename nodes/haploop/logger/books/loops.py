@@ -6,9 +6,11 @@ from functools import partial
 
 import numpy as np
 
+from haploop.plant.friction import step_loop
+from haploop.plant.friction.step_loop import NONE, STATES, add_up
 from haploop.protocol.machine_code import MachineCode
 
-_code = MachineCode(__file__, ())
+_code = MachineCode(__file__, (step_loop,))
 _inlined = partial(_code.compiled, inlined=True)
 # Integrals of products that are summed side by side: no chain has more, of dampers, links and the actuator.
 _PRODUCTS = 6
@@ -17,13 +19,8 @@ _PRODUCTS = 6
 @_inlined
 def _rates_of(rates, lags, acting, rise, w):  # pragma: no cover
     """Fills in the rates; returns the lag integral."""
-    count, states, lag = len(rates), rates.shape[1], 0.0
-    for i in range(count):
-        row, total = rates[i], 0.0
-        for j in range(states):
-            if row[j] != 0.0:
-                total += row[j] * acting[j]
-        w[i] = total
+    count, lag = len(rates) - 3, 0.0
+    w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7] = add_up(rates, acting, NONE)
     w[count] = rise
     for i in range(count + 1):
         if lags[i] != 0.0:
@@ -32,10 +29,10 @@ def _rates_of(rates, lags, acting, rise, w):  # pragma: no cover
 
 
 @_inlined
-def _products_of(forms, w, found):  # pragma: no cover
+def _products_of(forms, w, count, found):  # pragma: no cover
     a, b, c, d, e, f, pair = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
-    for i in range(len(w)):
-        for j in range(i, len(w)):
+    for i in range(count):
+        for j in range(i, count):
             both, of = w[i] * w[j], forms[pair]
             a, b, c = a + of[0] * both, b + of[1] * both, c + of[2] * both
             d, e, f = d + of[3] * both, e + of[4] * both, f + of[5] * both
@@ -62,12 +59,14 @@ def _stored(masses, links, stiffness, rest, at, then, way):  # pragma: no cover
 
 
 @_code.compiled
-def _book(masses, links, spring, rates, forms, lags, which, rows, pieces, first, constant_N, found):  # pragma: no cover
-    """Fills in the books of each step; a segment is a step, or a piece of one."""
-    n, states, steps, members = len(masses), rates.shape[1], rows.shape[1] - 1, rows.shape[2]
-    constants = max(len(constant_N) - 1, 0)
-    columns, products, due = states + n, len(found) - 4 - constants, first.copy()
-    acting, w, heats, book = np.empty(states + 3), np.empty(states + 1), np.empty(_PRODUCTS), np.empty(len(found))
+def _book(
+    masses, links, spring, rates, forms, lags, which, rows, pieces, first, constant_N, has_lag, found
+):  # pragma: no cover
+    """Fills in the books of each tick, summed step by step; a segment is a step, or a piece of one."""
+    n, states, steps, members = len(masses), rates.shape[1] - 3, rows.shape[1] - 1, rows.shape[2]
+    constants, steps_per_tick = max(len(constant_N) - 1, 0), steps // found.shape[1]
+    columns, products, due = states + n, len(found) - 5 - constants, first.copy()
+    acting, w, heats, book = np.empty(states + 3), np.empty(STATES + 1), np.empty(_PRODUCTS), np.empty(len(found))
     at, then = np.empty(columns), np.empty(columns)
     for step in range(steps):
         for m in range(members):
@@ -103,7 +102,7 @@ def _book(masses, links, spring, rates, forms, lags, which, rows, pieces, first,
                 acting[states], acting[states + 1], acting[states + 2] = rows[columns + 2, step, m], friction, start
                 kind = which[2 * level + stuck]
                 lag = _rates_of(rates[stuck], lags[kind], acting, rise, w)
-                _products_of(forms[kind], w, heats)
+                _products_of(forms[kind], w, states + 1, heats)
                 way, moved = 0.0, (then[0] - at[0]) + (then[states] - at[states])
                 for i in range(n):
                     way += (then[i] - at[i]) + (then[states + i] - at[states + i])
@@ -120,30 +119,43 @@ def _book(masses, links, spring, rates, forms, lags, which, rows, pieces, first,
                 book[products + 3] += stored
                 for i in range(constants):
                     book[products + 4 + i] += constant_N[i] * way
-            due[m] = p
+            due[m], tick = p, step // steps_per_tick
+            dx = (rows[0, step + 1, m] - rows[0, step, m]) + (rows[states, step + 1, m] - rows[states, step, m])
+            book[-1] = (book[products] if has_lag else 0.0) + rows[columns + 4, step, m] * dx
             for i in range(len(found)):
-                found[i, step, m] = book[i]
+                if step % steps_per_tick:
+                    found[i, tick, m] += book[i]
+                else:
+                    found[i, tick, m] = book[i]
 
 
-def books_by_step(device: list[np.ndarray], rows: np.ndarray, pieces: np.ndarray, first: np.ndarray,
-                  constant_N: np.ndarray, books: int) -> np.ndarray:  # fmt: skip
-    """Returns the energy that each step adds to each book, J, shape (books, steps, members).
+def books_by_tick(device: list[np.ndarray], rows: np.ndarray, pieces: np.ndarray, first: np.ndarray,
+                  constant_N: np.ndarray, books: int, ticks: int, has_lag: bool) -> np.ndarray:  # fmt: skip
+    """Returns the energy that each tick adds to each book, J, shape (books, ticks, members).
 
-    The books are those of ``ChainBooks``, with the lag of the actuator, if there is one, after the heats of dampers.
+    The books are those of ``ChainBooks``, with the lag of the actuator, if it has one, after the heats of dampers, and
+    last that lag and what the actuator's limits keep: the force beyond them times the way of the device.
 
     Args:
         device: masses in kg, stiffness of the links in N/m, (stiffness N/m, rest m) of the hand's spring, and what
             ``ChainForms.for_loops`` returns.
         rows: at each step and at the end, of each member: the states, what rounding left of the lengths, friction,
-            whether body 0 is stuck, the force held and tau; shape (states + lengths + 4, steps + 1, members).
+            whether body 0 is stuck, the force held, tau and the force beyond the limits of the actuator; shape
+            (states + lengths + 5, steps + 1, members).
         pieces: of steps that were cut, by member and in order: the same up to stuck, then step, level and what setting
             v to 0 threw away; shape (states + lengths + 5, pieces).
         first: where the pieces of each member begin, and where the last end, shape (members + 1,).
         constant_N: constant forces in tau, and last their sum, N; none of them, no sum.
     """
-    found = np.empty((books, rows.shape[1] - 1, rows.shape[2]))
-    _book(*device, rows, pieces, first, constant_N, found)
+    found = np.empty((books, ticks, rows.shape[2]))
+    _book(*device, rows, pieces, first, constant_N, has_lag, found)
     return found
+
+
+def rates_of(rates: list[np.ndarray]) -> np.ndarray:
+    """Returns the rates with body 0 free and held as the loop takes them, (2, what acts, states, filled up)."""
+    table = np.stack(rates)
+    return np.ascontiguousarray(np.pad(table, [(0, 0), (0, STATES - table.shape[1]), (0, 0)]).swapaxes(1, 2))
 
 
 def pairs_of(forms: np.ndarray) -> np.ndarray:
@@ -159,6 +171,6 @@ def try_out() -> None:
     """Compiles the loop, or loads it; raises whatever numba does."""
     one = np.zeros(1)
     forms = pairs_of(np.zeros((1, 1, 3, 3))), np.zeros((1, 3)), np.zeros(2, np.int64)
-    device = [one, np.zeros(0), np.zeros(2), np.zeros((2, 2, 5)), *forms]
+    device = [one, np.zeros(0), np.zeros(2), rates_of([np.zeros((2, 5))] * 2), *forms]
     pieces, first = np.zeros((8, 0)), np.zeros(2, np.int64)
-    _code.try_out(lambda: books_by_step(device, np.zeros((7, 2, 1)), pieces, first, one[:0], 5))
+    _code.try_out(lambda: books_by_tick(device, np.zeros((8, 2, 1)), pieces, first, one[:0], 6, 1, False))

@@ -143,7 +143,7 @@ def _elapsed(step: np.ndarray, level: np.ndarray) -> np.ndarray:
     return (over - over[first]).astype(float) / 2.0**_FINEST
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _made_of(_chain: str) -> Made:
     """Returns the forms made so far of a chain, written out: runs of one device in one process share them."""
     return {}
@@ -241,7 +241,7 @@ class ChainForms:
             products, lags = (np.stack(part) for part in zip(*forms.values(), strict=True))
             which = np.zeros(max(forms) + 1, np.int64)
             which[[*forms]] = np.arange(len(forms))
-            self._of_loops = [np.stack([*self._rates.values()]), loops.pairs_of(products), lags, which]
+            self._of_loops = [loops.rates_of([*self._rates.values()]), loops.pairs_of(products), lags, which]
         return self._of_loops
 
     def select(self, kept: np.ndarray) -> None:

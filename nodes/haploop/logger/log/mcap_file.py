@@ -111,7 +111,7 @@ class McapFile:
         self.close()
         self._failure = LogError(
             f"Writing the log {self.path} failed after {self.size} bytes ({error.strerror}). "
-            f"What was written before that stays and can be read with haploop.logger.read; "
+            f"What was written before that stays and can be read with haploop.api.read; "
             f"make room there, or write the run to another directory, and run again."
         )
         raise self._failure from error

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from haploop.logger.verdict.ripple import ripple
+from haploop.logger.verdict.ripple import peak_to_peak, ripple
 
 WINDOW_S = 0.5
 CROSSINGS = 4
@@ -16,6 +16,13 @@ CROSSINGS = 4
 SMALLEST_SWING_M = 1e-6
 # A quantised position on the wall's face may lie inside by this much, relative to the face's position.
 ROUNDING = 1e-12
+_WINDOW = f"the last {WINDOW_S:g} s (second half of a shorter run)"
+# Why the window of a run bears no word, whatever is seen in it.
+UNTOLD = {
+    "no tick": "The run ended before its first tick was done.",
+    "failed": "The run failed, and nothing tells how it would have gone on.",
+    "changed": f"The loop was changed at {{at_s:g}} s, within {_WINDOW}, so that no window shows it as it is now.",
+}
 
 
 class Figures(NamedTuple):
@@ -28,7 +35,8 @@ class Figures(NamedTuple):
         displayed_stiffness_N_m: mean of total force over penetration, ticks in contact (Choi et al. 2022, V.B.2), but
             those whose penetration is a rounding error of the wall's position; None of none.
         penetration_mean_m: ticks in contact; None of none.
-        force_ripple_N: of the commanded force, peak to peak; see ``ripple``.
+        force_ripple_N: what the commanded force swings by above 30 Hz, peak to peak; see ``ripple``.
+        force_swing_N: the commanded force as it is, peak to peak.
     """
 
     from_s: float
@@ -38,6 +46,7 @@ class Figures(NamedTuple):
     displayed_stiffness_N_m: float | None
     penetration_mean_m: float | None
     force_ripple_N: float
+    force_swing_N: float
 
 
 class WindowMeasures(NamedTuple):
@@ -52,7 +61,7 @@ class WindowMeasures(NamedTuple):
 class MeasuredColumns(NamedTuple):
     """Measures of the windows of some runs, a list each: of ``swings``, the width peak to peak, the ticks in contact.
 
-    Displayed stiffness and penetration are means of ticks in contact, None of none; the ripple is that of the command.
+    Displayed stiffness and penetration are means of ticks in contact, None of none; forces are those of the command.
     """
 
     crossings: list[int]
@@ -62,6 +71,7 @@ class MeasuredColumns(NamedTuple):
     stiffness_N_m: list[float | None]
     depth_m: list[float | None]
     ripple_N: list[float]
+    swing_N: list[float]
 
 
 class Extremes(NamedTuple):
@@ -90,21 +100,47 @@ class RunMeasures(NamedTuple):
         """Tells whether every number is finite, and no sum of them is beyond what a float holds."""
         return math.isfinite(sum(self.extremes) + sum(filter(None, self.window.figures)))
 
-    def verdict(self, diverged: str | None) -> Verdict:
-        """Judges the run; ``diverged`` is why the plant ended by itself, if it did."""
+    def verdict(self, diverged: str | None, untold: str = "") -> Verdict:
+        """Judges the run by its window.
+
+        Args:
+            diverged: why the plant ended by itself, if it did.
+            untold: why the window bears no word, a sentence; "" where it does.
+        """
         if diverged:
             return Verdict("diverged", f"{diverged}.")
         window = self.window
-        if not window.touched:
-            return Verdict(
-                "no-contact", f"No tick of the last {WINDOW_S:g} s (second half of a shorter run) was in contact."
-            )
         rule = (
-            f"In the last {WINDOW_S:g} s (second half of a shorter run) x crossed its trend line {window.crossings} "
+            f"In {_WINDOW} x crossed its trend line {window.crossings} "
             f"times by more than {self.swing_m * 1e6:.3g} um, its second half {window.growth:.2f} times as wide as its "
             f"first; a limit cycle is at least {CROSSINGS} crossings and 0.5 times."
+            if window.touched
+            else f"No tick of {_WINDOW} was in contact."
         )
+        if untold:
+            return Verdict("undecided", untold if untold == UNTOLD["no tick"] else f"{untold} {rule}")
+        if not window.touched:
+            return Verdict("no-contact", rule)
         return Verdict("limit-cycle" if window.crossings >= CROSSINGS and window.growth >= 0.5 else "steady", rule)
+
+    def untold(self, ticks: int, ended: str, changed_s: float | None) -> str:
+        """Returns why the window bears no word, "" where it does.
+
+        Args:
+            ticks: that ran.
+            ended: how the run ended; "" while it goes on.
+            changed_s: when the loop was changed within the window; None if it was not.
+        """
+        if not ticks:
+            return UNTOLD["no tick"]
+        if ended == "failed":
+            return UNTOLD["failed"]
+        return UNTOLD["changed"].format(at_s=changed_s) if changed_s is not None and self.window.touched else ""
+
+    def of_two_loops(self) -> RunMeasures:
+        """Returns them for a window in which the loop was changed: it displayed more than one stiffness."""
+        figures = self.window.figures._replace(displayed_stiffness_N_m=None)
+        return self._replace(window=self.window._replace(figures=figures))
 
 
 class Span(NamedTuple):
@@ -147,6 +183,7 @@ def measure_window(
         _means(stiffness, real),
         _means(np.abs(depth), inside),
         ripple(held["total"], control_rate).tolist(),
+        peak_to_peak(held["total"]).tolist(),
     )
     return window_measures(measured, span, rate)
 
@@ -155,11 +192,11 @@ def window_measures(measured: MeasuredColumns, span: Span, rate: int) -> list[Wi
     """Returns the measures of each run's window, with the figures of the summary."""
     start_s, seconds = span.first / rate, (span.steps + 1) / rate
     measures = []
-    for crossings, growth, width_m, inside, stiffness_N_m, depth_m, ripple_N in zip(*measured, strict=True):
+    for crossings, growth, width_m, inside, stiffness_N_m, depth_m, *forces_N in zip(*measured, strict=True):
         # What is `growth` times as wide in the second half of the window follows e^(r t).
         rate_1_s = 2.0 * math.log(growth) / seconds if crossings >= CROSSINGS and growth > 0.0 else None
         outside = (span.ticks - inside) / span.ticks if span.ticks else 1.0
-        figures = Figures(start_s, width_m, rate_1_s, outside, stiffness_N_m, depth_m, ripple_N)
+        figures = Figures(start_s, width_m, rate_1_s, outside, stiffness_N_m, depth_m, *forces_N)
         measures.append(WindowMeasures(inside > 0, crossings, growth, figures))
     return measures
 

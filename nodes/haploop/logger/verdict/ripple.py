@@ -13,7 +13,8 @@ def ripple(force_N: np.ndarray, rate: float) -> np.ndarray:
 
     A force that does not end where it began would make a jump, which holds every frequency: what is left of the trend
     is mirrored at its end before it is transformed, and one period of that frequency, a quarter of the samples at most,
-    is left out at either end. Of a swing at 12 Hz 4 % pass, of one at 8 Hz 2 %.
+    is left out at either end. Of a swing at 12 Hz 4 % pass, of one at 8 Hz 2 %. It is told as no more than the force
+    itself swings by: of one at 30 Hz the edge of the filter lets a part of the line pass, which may be a fourth wider.
 
     Args:
         force_N: forces at equal times, shape (..., samples).
@@ -22,11 +23,16 @@ def ripple(force_N: np.ndarray, rate: float) -> np.ndarray:
     if force_N.shape[-1] < 4:
         return np.zeros(force_N.shape[:-1])
     with np.errstate(over="ignore", invalid="ignore"):  # a force that is no finite number has no ripple, nan
-        return np.ptp(_above(force_N, rate), axis=-1)
+        return np.minimum(np.ptp(above(force_N, rate), axis=-1), peak_to_peak(force_N))
 
 
-def _above(force_N: np.ndarray, rate: float) -> np.ndarray:
-    """Returns what of a force is faster than ``RIPPLE_ABOVE_HZ``, without its ends."""
+def peak_to_peak(force_N: np.ndarray) -> np.ndarray:
+    """Returns what a force swings by, peak to peak in N, over its last axis; 0 of none."""
+    return np.ptp(force_N, axis=-1) if force_N.shape[-1] else np.zeros(force_N.shape[:-1])
+
+
+def above(force_N: np.ndarray, rate: float) -> np.ndarray:
+    """Returns what of a force, or of another trace, is faster than ``RIPPLE_ABOVE_HZ``, without its ends."""
     count = force_N.shape[-1]
     t = np.arange(count) - (count - 1) / 2.0
     offset = force_N - force_N.mean(axis=-1, keepdims=True)

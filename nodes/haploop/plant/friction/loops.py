@@ -13,7 +13,10 @@ from haploop.plant.chain import motion
 from haploop.plant.chain.history import StickSlipState
 from haploop.plant.friction import step_loop, stick_slip, substeps
 from haploop.plant.friction.step_loop import (
+    ACTS,
+    NONE,
     STATES,
+    add_up,
     decide_at_rest,
     holds_through,
     may_switch_within,
@@ -36,7 +39,7 @@ _TOGETHER = 8
 @_code.compiled
 def _follow(of, mode, held, forced, course, loads, ends, begin, y, comp, z, after, moved):  # pragma: no cover
     """Follows a mode from a step on; returns the first step in which it does not hold. See ``motion.follow``."""
-    size, friction, k = len(y), slipping(of, mode), int(mode.is_stuck)
+    size, friction, k = forced.shape[2], slipping(of, mode), int(mode.is_stuck)
     for j in range(size):
         z[j] = y[j] = course[begin, j]
         comp[j] = course[begin, size + j]
@@ -48,12 +51,13 @@ def _follow(of, mode, held, forced, course, loads, ends, begin, y, comp, z, afte
         at, first = max(first, begin), end
         for step in range(at, end):
             command, load, end_load = course[step, 2 * size], loads[step], loads[step + 1]
-            table, response, row = held[k, step - at], forced[k, step + 1], course[step + 1]
+            response, row = forced[k, step + 1], course[step + 1]
+            y[size], y[size + 1] = command, friction
+            total = add_up(held[k, step - at], y, NONE)
+            moved[0], moved[1], moved[2], moved[3] = total[0], total[1], total[2], total[3]
+            moved[4], moved[5], moved[6], moved[7] = total[4], total[5], total[6], total[7]
             for j in range(size):
-                total = 0.0
-                for i in range(size):
-                    total += table[j, i] * y[i]
-                moved[j] = total + table[j, size] * command + table[j, size + 1] * friction + comp[j]
+                moved[j] = moved[j] + comp[j]
                 change = moved[j] + response[j]
                 after[j] = row[j] = y[j] + change
                 row[size + j] = change - (after[j] - y[j])
@@ -76,7 +80,7 @@ def _follow(of, mode, held, forced, course, loads, ends, begin, y, comp, z, afte
 
 
 @_code.compiled
-def _walk(
+def walk(
     of, halving, whole_steps, tables, held, forced, course, loads, ends, first_step, mode, pieces, room
 ):  # pragma: no cover
     """Moves one member through an interval; returns its mode at the end."""
@@ -89,6 +93,8 @@ def _walk(
         if step < n:
             for j in range(size):
                 z[j], comp[j] = course[step, j], course[step, size + j]
+            for j in range(size, STATES):
+                z[j] = comp[j] = 0.0
             made = solve_step(
                 of, halving, tables, mode, first_step + step, z, comp, course[step, 2 * size], loads[step],
                 loads[step + 1] - loads[step], pieces, next_z, next_comp,
@@ -104,7 +110,7 @@ def _walk(
 
 
 @_code.compiled
-def _row(rows, at):  # pragma: no cover
+def row_of(rows, at):  # pragma: no cover
     of = rows[at]
     return Row((of[0], of[1], of[2], of[3], of[4], of[5], of[6], of[7]), of[8], of[9])
 
@@ -115,9 +121,9 @@ def _advance(
     upto, member,
 ):  # pragma: no cover  # fmt: skip
     """Moves members through an interval, from one on; returns the first one whose pieces there is no room for."""
-    members, n, size = courses.shape[2], courses.shape[0] - 1, tables.shape[2]
-    force, change = _row(rows, 0), _row(rows, 1)
-    halving, room = substeps.Halving(whole[1], whole[2]), np.empty((5, size))
+    members, n, size = courses.shape[2], courses.shape[0] - 1, free.shape[1]
+    force, change = row_of(rows, 0), row_of(rows, 1)
+    halving, room = substeps.Halving(whole[1], whole[2]), np.empty((5, ACTS))
     some, load = np.empty((_TOGETHER, n + 1, 2 * size + 6)), np.empty((_TOGETHER, n + 1))
     forced = np.empty((2, n + 1, size))
     while member < members:
@@ -138,7 +144,7 @@ def _advance(
             rubs = stick_slip.Friction(laws[0, law], laws[1, law], laws[2, law], laws[3, law])
             of = StickSlip(rubs, whole[0], mass_kg, speed_up, force, change)
             mode = StickSlipState(modes[0, m] > 0.0, modes[1, m])
-            mode = _walk(
+            mode = walk(
                 of,
                 halving,
                 whole[3] > 0,
@@ -174,6 +180,11 @@ class Loops:
     Args:
         tables: transitions over h / 2^level by whether body 0 is stuck and by level, (2, levels, states + 4, states).
         held: over 1 ... n steps by whether it is stuck, (2, states + 2, n, states).
+
+    Attributes:
+        system: what the loops need of the chain.
+        states: their number.
+        pieces, room: for pieces, whose number stands in a last row, and for states on the way.
     """
 
     def __init__(
@@ -185,9 +196,13 @@ class Loops:
             row[-2:] = others
             for i, factor in of_states:
                 row[i] = factor
-        of_each_state = np.ascontiguousarray(tables.swapaxes(2, 3)), np.ascontiguousarray(held.transpose(0, 2, 3, 1))
-        self._system = of.mass_kg, of.speed_up, rows, np.array([of.v, *halving, whole_steps]), *of_each_state
-        self._pieces = np.empty((_PIECES + 1, 6 + tables.shape[-1] + of.v))
+        filled = [(0, 0)] * 3 + [(0, STATES - tables.shape[-1])]
+        both = np.pad(tables, filled), np.ascontiguousarray(tables.swapaxes(2, 3))
+        held = np.ascontiguousarray(np.pad(held, filled).swapaxes(1, 2))
+        self.system = of.mass_kg, of.speed_up, rows, np.array([of.v, *halving, whole_steps]), both, held
+        self.states = tables.shape[-1]
+        self.pieces = np.zeros((_PIECES + 1, 6 + self.states + of.v))
+        self.room = np.empty((5, ACTS))
 
     def advance(
         self, course: np.ndarray, forced: tuple[np.ndarray, np.ndarray], loads: np.ndarray, holds: list[Hold],
@@ -208,11 +223,11 @@ class Loops:
             interval is then to be moved by other means.
         """
         ends = _ends_of(tuple([hold[0] for hold in holds]))
-        found, pieces, begun, members = list[tuple[int, np.ndarray]](), self._pieces, 0, course.shape[2]
+        found, pieces, begun, members = list[tuple[int, np.ndarray]](), self.pieces, 0, course.shape[2]
         upto = np.empty(members, np.int64)
         while begun < members:
             pieces[-1, 0] = 0.0
-            member = _advance(*self._system, laws, *forced, loads, ends, first_step, course, modes, pieces, upto, begun)
+            member = _advance(*self.system, laws, *forced, loads, ends, first_step, course, modes, pieces, upto, begun)
             if member == begun:
                 return None
             if count := int(pieces[-1, 0]):
@@ -236,9 +251,14 @@ def try_out() -> None:
     _code.try_out(_try_out)
 
 
-def _try_out() -> None:
+def smallest() -> Loops:
+    """Returns the loops of a chain of one body with one plant step a tick, that does not move."""
     row = Row([], 1.0, 1.0)
     of = StickSlip(stick_slip.Friction(1.0, 1.0, 0.0, 1.0), 1, 1.0, 1.0, row, row)
-    loops = Loops(of, substeps.Halving(0, 1), True, np.zeros((2, 3, 6, 2)), np.zeros((2, 4, 1, 2)))
+    return Loops(of, substeps.Halving(0, 1), True, np.zeros((2, 3, 6, 2)), np.zeros((2, 4, 1, 2)))
+
+
+def _try_out() -> None:
     forced = np.zeros((2, 2, 1)), np.zeros((2, 2, 1))
-    loops.advance(np.zeros((2, 10, 1)), forced, np.zeros((2, 1)), [(1, 0.0, 0)], 0, np.ones((2, 1)), np.ones((4, 1)))
+    course, hold = np.zeros((2, 10, 1)), (1, 0.0, 0)
+    smallest().advance(course, forced, np.zeros((2, 1)), [hold], 0, np.ones((2, 1)), np.ones((4, 1)))

@@ -1,4 +1,4 @@
-"""The motion of a chain whose first body sticks and slips, alone and in a batch."""
+"""The motion of a chain whose first body sticks and slips."""
 
 from __future__ import annotations
 
@@ -14,10 +14,8 @@ from haploop.plant.friction.stick_slip import (
     RubbingHistory,
     StickSlip,
     decide_at_rest,
-    holds_against,
     holds_through,
     may_switch_within,
-    row_on,
     slipping,
     slipping_at,
 )
@@ -26,14 +24,14 @@ from haploop.plant.line import Hold
 from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.trees import tree_member, tree_select, tree_take
 
 if TYPE_CHECKING:
+    from haploop.plant.friction.course import Course
     from haploop.plant.friction.loops import Loops
 
 
 # For so many intervals in all.
-LOOPS = WhereItPays("haploop.plant.friction.loops", 20_000)
+LOOPS = WhereItPays("haploop.plant.friction.course", 20_000)
 
 
 class FrictionMotion(RubbingHistory, ChainMotion):
@@ -46,17 +44,46 @@ class FrictionMotion(RubbingHistory, ChainMotion):
     other, and every one of a scene too stiff or with too curved a law for that, is solved step by step.
     """
 
+    _course: Course | None = None
+
     def __init__(self, scene: Scene, time: Timebase) -> None:
         super().__init__(scene, time)
         self._clamped = self._response(stuck=True)
         self._pieces: list[Any] = []
-        self._piece, self._ahead = -1, list[np.ndarray]()
+        self._piece = -1
         self._halving, self._whole_steps = halving_of(self.chain, self._step_s), goes_by_whole_steps(scene)
         levels = self._halving.finest + 1
         self._tables = [
             ChainTransition(self.chain, self._step_s, self._n, stuck).halves(levels) for stuck in (False, True)
         ]
-        self._loops, self._laws = self.loops_for(time.ticks), np.array(self.friction)[:, None]
+        if loops := self.loops_for(time.ticks):
+            self._course = LOOPS.module().Course(loops, self.friction, self._n)
+
+    @property
+    def state(self) -> ChainState:
+        """The state at the end of the last interval; one that is set is gone on from."""
+        if self._is_behind and self._course:
+            self._state, self._is_behind = self._course.end(self._sensed), False
+        return self._state
+
+    @state.setter
+    def state(self, state: ChainState) -> None:
+        self._state, self._sensed, self._is_behind = state, state.sensed, False
+        if self._course:
+            self._hand_over()
+            self._course.row = -1
+
+    def _hand_over(self) -> None:
+        """Puts what is new in the course into the record."""
+        if self._course:
+            rows, pieces = self._course.take()
+            if len(rows):
+                self._done.append(Interval.of(rows, len(self.chain.states)))
+            if len(pieces):
+                self._pieces.append(pieces)
+
+    def acceleration(self, _tick: int) -> Any:
+        return self._sensed[0] if self._sensed else 0.0
 
     def rub_by(self, law: Friction) -> StickSlip:
         """Goes on by another law: of one member of a batch, or of some, for what is asked of them next."""
@@ -71,14 +98,11 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         return module.Loops(self._stick_slip, self._halving, self._whole_steps, np.stack(self._tables), held)
 
     def advance(self, tick: int, holds: list[Hold]) -> Any:
-        if self._loops and (found := self._by_loops(self._loops, tick, holds)):
-            return self._accept(tick, *found)
+        if self._course and (x := self._by_loop(self._course, tick, holds)) is not None:
+            return x
         loads = self.loads(tick * self._n, (tick + 1) * self._n + 1)
-        return self.advance_under(loads, self._forced(tick), tick, holds)
-
-    def _forced(self, tick: int) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the forced response of interval ``tick`` while the first body slips, and while it is stuck."""
-        return self._free.of_interval(tick), self._clamped.of_interval(tick)
+        forced = self._free.of_interval(tick), self._clamped.of_interval(tick)
+        return self.advance_under(loads, forced, tick, holds)
 
     def advance_under(
         self, loads: np.ndarray, forced: tuple[np.ndarray, np.ndarray], tick: int, holds: list[Hold]
@@ -98,25 +122,23 @@ class FrictionMotion(RubbingHistory, ChainMotion):
                 step += 1
         return self._accept(tick, interval, mode)
 
-    def _by_loops(self, loops: Loops, tick: int, holds: list[Hold]) -> tuple[Interval, StickSlipState] | None:
-        """Returns the interval by loops of machine code, and the mode at its end; None where they cannot."""
-        interval, mode, n, (piece, at) = self._begin(holds), self.state.mode, self._n, divmod(tick, PIECE_TICKS)
-        assert mode
-        if piece != self._piece:
-            first = piece * PIECE_TICKS * n
-            loads = self.loads(first, first + PIECE_TICKS * n + 1)
-            self._piece, self._ahead = (
-                piece,
-                [of[..., None] for of in (self._free.of_piece(piece), self._clamped.of_piece(piece), loads)],
-            )
-        free, clamped, loads = self._ahead
-        of_this = (free[at], clamped[at]), loads[at * n : (at + 1) * n + 1]
-        modes = np.array(((mode.is_stuck,), (mode.direction,)), float)
-        pieces = loops.advance(interval.course[..., None], *of_this, holds, tick * n, modes, self._laws)
-        if pieces is None:
-            return None
-        self._pieces += [rows for _, rows in pieces]
-        return interval, StickSlipState(modes.item(0) > 0.0, modes.item(1))
+    def _by_loop(self, course: Course, tick: int, holds: list[Hold]) -> float | None:
+        """Returns x at the end of an interval moved by the loop; None where it cannot."""
+        piece, at = divmod(tick, PIECE_TICKS)
+        if piece != self._piece or course.row < 0:
+            self._hand_over()
+            first, self._piece = piece * PIECE_TICKS * self._n, piece
+            forced = np.stack([self._free.of_piece(piece), self._clamped.of_piece(piece)], axis=1)
+            course.begin(self.state, forced, self.loads(first, first + PIECE_TICKS * self._n + 1))
+        x = course.advance(at, tick * self._n, holds)
+        if x is None:  # perhaps the pieces of others took all the room
+            self._hand_over()
+            if (x := course.advance(at, tick * self._n, holds)) is None:
+                return None
+        self._is_behind = True
+        if self._sensed:
+            self._sensed = self._sensor.after(self._sensed, *course.interval(), tick * self._n + 1)
+        return x
 
     def _follow(
         self, mode: StickSlipState, interval: Interval, begin: int, holds: list[Hold], loads: np.ndarray,
@@ -158,6 +180,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
 
     def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, np.ndarray]:
         """Returns the record as without friction, and beside it the pieces of steps that were cut."""
+        self._hand_over()
         pieces = pieces_record(self.chain, self.take_pieces())
         return super().take_record(tick, positions_only=positions_only) | pieces
 
@@ -170,110 +193,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         """Returns the last interval, which is then in no record."""
         return self._done.pop()
 
-
-class BatchFrictionMotion(RubbingHistory, ChainMotion):
-    """``FrictionMotion`` of the members of a batch with the same chain; loads and what friction measures may differ.
-
-    In an interval all members go as far as they would if nothing switched, those that stick and those that slip apart.
-    Most do. For each of the others the interval is solved anew by the motion of one run.
-    """
-
-    def __init__(self, scene: Scene, time: Timebase, members: int) -> None:
-        self._one = FrictionMotion(tree_member(scene, 0), time)
-        self._pieces: list[tuple[int, Any]] = []
-        super().__init__(scene, time, members)
-        self._stick_slip = StickSlip.of(self.chain, self.friction, self._step_s)
-        self._clamped = self._response(stuck=True)
-        self._loops = self._one.loops_for(time.ticks * members)
-
-    def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
-        loads = np.broadcast_to(self.loads(0, 1)[0], z.shape[1:]).tolist()
-        begun = []
-        for place, (start, load) in enumerate(zip(z.T, loads, strict=True)):
-            self._one.rub_by(tree_member(self.friction, place))
-            begun.append(self._one.begun_under(start, load))
-        held, modes = zip(*begun, strict=True)
-        return np.stack(held, axis=-1), StickSlipState(*map(np.array, zip(*modes, strict=True)))
-
-    def advance(self, tick: int, holds: list[Hold]) -> Any:
-        interval, loads = self._begin(holds), self.loads(tick * self._n, (tick + 1) * self._n + 1)
-        forced = self._free.of_interval(tick), self._clamped.of_interval(tick)
-        if self._loops and (mode := self.state.mode):
-            modes = np.stack([mode.is_stuck, mode.direction])
-            laws = np.stack(np.broadcast_arrays(*(np.atleast_1d(number) for number in self.friction)))
-            found = self._loops.advance(interval.course, forced, loads, holds, tick * self._n, modes, laws)
-            if found is not None:
-                self._pieces += found
-                return self._accept(tick, interval, StickSlipState(modes[0] > 0.0, modes[1]))
-        is_stuck, direction = self._decided(interval, loads)
-        lasts = np.empty(is_stuck.shape, bool)
-        for kind in (False, True):
-            places = np.flatnonzero(is_stuck == kind)
-            if len(places):
-                mode = StickSlipState(kind, direction[places])
-                of_these = tree_take((loads, forced[kind]), places)
-                lasts[places] = self._follow(mode, interval, places, tree_take(holds, places), *of_these)
-        for place in np.flatnonzero(~lasts).tolist():
-            of_this = tree_member((loads, forced), place)
-            is_stuck[place], direction[place] = self._solve(interval, place, tick, tree_member(holds, place), *of_this)
-        return self._accept(tick, interval, StickSlipState(is_stuck, direction))
-
-    def _decided(self, interval: Interval, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the modes at the beginning; see ``decide_at_rest``."""
-        z, mode = interval.states[0], self.state.mode
-        assert mode
-        force, is_at_rest = row_on(self._stick_slip.force, z, interval.held[0, 0], loads[0]), z[self._v] == 0.0
-        is_stuck = np.where(is_at_rest, holds_against(self.friction, force), mode.is_stuck)
-        return is_stuck, np.where(is_at_rest, np.copysign(1.0, force), mode.direction)
-
-    def _follow(
-        self, mode: StickSlipState, interval: Interval, places: np.ndarray, holds: list[Hold], loads: np.ndarray,
-        forced: np.ndarray,
-    ) -> np.ndarray:  # fmt: skip
-        """Lets some members, of which all stick or all slip, follow their mode; returns which of them it holds for."""
-        some = Interval.of(np.ascontiguousarray(interval.course[..., places]), len(self.state.z))
-        friction = slipping(self._one.rub_by(tree_take(self.friction, places)), mode)
-        follow((self._clamped if mode.is_stuck else self._free).held, forced, some, 0, holds, friction)
-        some.held[:, 2], some.held[:, 3] = friction, mode.is_stuck
-        some.at_ends[:, 0], some.at_ends[:, 1] = friction, mode.is_stuck
-        interval.course[..., places] = some.course
-        return np.all(self._one.holds_in_steps(mode, some, 0, friction, loads), axis=0)
-
-    def _solve(
-        self, interval: Interval, place: int, tick: int, holds: list[Hold], loads: np.ndarray,
-        forced: tuple[np.ndarray, np.ndarray],
-    ) -> StickSlipState:  # fmt: skip
-        """Takes one member through the interval alone; returns its mode at the end."""
-        one, state = self._one, self.state
-        one.rub_by(tree_member(self.friction, place))
-        held, mode = one.state.held, tree_member(state.mode, place)
-        one.state = ChainState(state.z[:, place].copy(), state.z_comp[:, place].copy(), held, one.state.sensed, mode)
-        one.advance_under(loads, forced, tick, holds)
-        interval.course[..., place] = one.take_interval().course
-        if pieces := one.take_pieces():
-            self._pieces.append((place, np.array(pieces)))
-        assert one.state.mode
-        return one.state.mode
-
-    def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, Any]:
-        """Returns the record as without friction, and beside it ``pieces``, member by member.
-
-        These are (members that have any, how many each, ``pieces_record`` of all of them one after the other).
-        """
-        pieces, self._pieces = sorted(self._pieces, key=lambda piece: piece[0]), []
-        record = super().take_record(tick, positions_only=positions_only)
-        if positions_only:
-            return record
-        members, tables = np.array([place for place, _ in pieces], np.intp), [rows for _, rows in pieces]
-        counts = np.bincount(members, [len(rows) for rows in tables]).astype(np.intp)
-        places = np.flatnonzero(counts)
-        return record | {"pieces": (places, counts[places], pieces_record(self.chain, tables))}
-
     def forget_record(self) -> None:
+        self._hand_over()
         super().forget_record()
         self._pieces = []
-
-    def select(self, kept: np.ndarray) -> None:
-        super().select(kept)
-        self._clamped.select(kept)
-        self.friction = tree_select(self.friction, kept)

@@ -13,19 +13,37 @@ from haploop.protocol.machine_code import MachineCode
 
 _code = MachineCode(__file__, (stick_slip, substeps))
 _inlined = partial(_code.compiled, inlined=True)
-# No chain has more states.
-STATES = 8
+# No chain has more states; what acts on them are these, and four more.
+STATES, ACTS = 8, 12
+NONE = (0.0,) * STATES
+
+
+# Tables are twofold: with the states that are moved side by side, filled up to ``STATES``, for all of them at once, and
+# with what acts side by side, for one.
+
+
+@_inlined
+def add_up(table, z, total):  # pragma: no cover
+    """Adds (what acts) times (each row of a table), row by row, to ``total``, all states at once."""
+    a, b, c, d, e, f, g, h = total
+    for i in range(len(table)):
+        row, acts = table[i], z[i]
+        a, b, c, d = a + row[0] * acts, b + row[1] * acts, c + row[2] * acts, d + row[3] * acts
+        e, f, g, h = e + row[4] * acts, f + row[5] * acts, g + row[6] * acts, h + row[7] * acts
+    return a, b, c, d, e, f, g, h
 
 
 @_inlined
 def _moved(tables, of, z, z_comp, command, friction, load, rise, after, comp):  # pragma: no cover
-    size, table = len(z), tables[of[0], of[1]]
-    for j in range(size):
-        total, row = 0.0, table[j]
-        for i in range(size):
-            total += row[i] * z[i]
-        total = total + row[size] * command + row[size + 1] * friction
-        total = total + row[size + 2] * load + row[size + 3] * rise + z_comp[j]
+    table = tables[0][of[0], of[1]]
+    size = len(table) - 4
+    after[size], after[size + 1], after[size + 2], after[size + 3] = command, friction, load, rise
+    for i in range(size):
+        after[i] = z[i]
+    a, b, c, d, e, f, g, h = add_up(table, after, NONE)
+    comp[0], comp[1], comp[2], comp[3], comp[4], comp[5], comp[6], comp[7] = a, b, c, d, e, f, g, h
+    for j in range(STATES):
+        total = comp[j] + z_comp[j]
         end = z[j] + total
         after[j] = end
         comp[j] = total - (end - z[j])
@@ -33,7 +51,8 @@ def _moved(tables, of, z, z_comp, command, friction, load, rise, after, comp):  
 
 @_inlined
 def _one_moved(tables, of, at, z, z_comp, command, friction, load, rise):  # pragma: no cover
-    size, total, row = len(z), 0.0, tables[of[0], of[1], at]
+    row, total = tables[1][of[0], of[1], at], 0.0
+    size = len(row) - 4
     for i in range(size):
         total += row[i] * z[i]
     total = total + row[size] * command + row[size + 1] * friction
@@ -62,7 +81,7 @@ def _force_moved(row, tables, of, z, z_comp, command, friction, load, rise, end_
 
 @_inlined
 def _take_over(z, z_comp, next_z, next_comp):  # pragma: no cover
-    for i in range(len(z)):
+    for i in range(STATES):
         z[i], z_comp[i] = next_z[i], next_comp[i]
 
 
@@ -96,7 +115,7 @@ def _is_full(pieces, first, step):  # pragma: no cover
 
 @_inlined
 def _note(pieces, of, head, begin, comp):  # pragma: no cover
-    at, size = int(pieces[-1, 0]), len(begin)
+    at, size = int(pieces[-1, 0]), pieces.shape[1] - 6 - of.v
     pieces[-1, 0] += 1.0
     if at < len(pieces) - 1:
         pieces[at, 0], pieces[at, 1], pieces[at, 2], pieces[at, 3], pieces[at, 4], pieces[at, 5] = head

@@ -186,7 +186,7 @@ def solve_step(
             level = min(level + 1, halving.finest)
         if is_full(pieces, first, step):
             break
-    if count_of(pieces) == first + 1:
+    if not left and count_of(pieces) == first + 1:  # one that was broken off for want of room is not done
         drop_last(pieces)
     return Step(mode, begun_with, was_stuck)
 

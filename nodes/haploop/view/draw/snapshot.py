@@ -38,8 +38,8 @@ def snapshot(
     """Returns everything a page shows as bytes, packed by :func:`haploop.view.draw.messages.encode`.
 
     Tables over time are position, force and energy; each row by row where the page has room for it, else as an envelope
-    whose rows are the two extremes of consecutive buckets in the order in which they came. Then comes an overview of
-    the whole run, and what the page's panel asks for, to which ``changes`` belong. Position and total force of
+    whose rows are the two extremes of consecutive buckets, rising or falling as they do. Then comes an overview of the
+    whole run, and what the page's panel asks for, to which ``changes`` belong. Position and total force of
     ``overlay``, another run, come beside. A table without data is left out.
     """
     rate = history.time.control_rate

@@ -42,6 +42,7 @@ class Sight:
         from_s, to_s: the interval that was looked at.
         so_far: whether the interval is shorter than a window, so that no word is told yet.
         oscillation_m, ripple_N: widths of position and of applied force about their straight trends, peak to peak.
+        force_swing_N: the applied force as it is, peak to peak.
         frequency_Hz: of the line of the position where one stands out, else of that of the force; None for none.
         stiffness_N_m: mean of force over penetration at the ticks in contact; None of none.
     """
@@ -55,6 +56,7 @@ class Sight:
     ripple_N: float | None = None
     frequency_Hz: float | None = None
     stiffness_N_m: float | None = None
+    force_swing_N: float | None = None
 
 
 def window_ticks(rate: int) -> int:
@@ -119,6 +121,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     return Sight(
         word, why, first / rate, end / rate, so_far, float(np.ptp(_flat(x))), ripple,
         line.frequency_Hz if line else None, stiffness if inside[first - end :].any() else None,
+        float(np.ptp(force)),
     )  # fmt: skip
 
 

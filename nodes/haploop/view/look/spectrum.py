@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,11 @@ class Line(NamedTuple):
     share: float
 
 
+@lru_cache(maxsize=8)
+def _time_and_window(count: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.arange(count) - (count - 1) / 2.0, np.hanning(count + 1)[:-1]
+
+
 def amplitudes(samples: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
     """Returns frequencies in Hz and amplitudes, 0 to peak, of samples of shape (..., count) less their straight trend.
 
@@ -31,10 +37,9 @@ def amplitudes(samples: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray
     ``rate / count``, and the first is above 0.
     """
     count = samples.shape[-1]
-    t = np.arange(count) - (count - 1) / 2.0
+    t, window = _time_and_window(count)
     flat = samples - samples.mean(axis=-1, keepdims=True)
     flat = flat - t * (flat @ t / (t @ t))[..., None]
-    window = np.hanning(count + 1)[:-1]
     found = np.abs(np.fft.rfft(flat * window)) * (2.0 / window.sum())
     return np.fft.rfftfreq(count, 1.0 / rate)[1:], found[..., 1:]
 

@@ -145,9 +145,9 @@ class RunSession:
     def verdict_is(self) -> str:
         """Returns what there is of a verdict.
 
-        ``seen`` in the last half second, ``judged`` once the run has ended; between the two ``awaited``, or
-        ``abandoned`` where its launcher has gone; ``unjudged`` of a run that was too long, ``foreign`` of one of which
-        a half was not haploop's own; ``unknown`` where no summary can be read.
+        ``seen`` in the last half second, ``judged`` once the run has ended, or nothing can tell more; between the two
+        ``awaited``, or ``abandoned`` where its launcher has gone; ``unjudged`` of a run that was too long, ``foreign``
+        of one of which a half was not haploop's own; ``unknown`` where no summary can be read.
         """
         if not self.summary:
             return "unknown" if self.outcome == "ended" else "seen"
@@ -155,7 +155,7 @@ class RunSession:
             return "foreign"
         if awaits_verdict(self.scene, self.summary):
             return "abandoned" if self.given_up else "awaited"
-        if "stability" in self.summary:
+        if "stability" in self.summary or self.summary["verdict"] == "undecided":
             return "judged"
         is_long = self.scene.run.verdict == "pushed" and self.summary["duration_s"] > REPEATED_S
         return "unjudged" if is_long else "seen"

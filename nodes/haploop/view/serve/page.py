@@ -1,6 +1,7 @@
 """The connection of one page: snapshots, state and events go out, its viewport and commands come in.
 
-A snapshot goes out once the page says that it has drawn the last one: a slow or hidden page costs nothing.
+At most two snapshots are on their way to a page that has not said yet that it drew them: a slow or hidden one costs
+nothing, and one whose answers take longer than a picture still gets every picture.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ _STATE_S = 0.4
 _LONGEST_REASON = 120
 _FEWEST_POINTS, _MOST_POINTS = 50, 8000
 _LONGEST_S = 1e9
+# Snapshots that go out before the page has drawn them.
+_MOST_UNDRAWN = 2
 # Commands that a page may send; the clock answers more.
 _VERBS = ("pause", "resume", "step", "stop", "swap", "set", "undo", "pace", "open", "overlay")
 # Those of them that change what is shown, and nothing in a run.
@@ -44,7 +47,7 @@ class Page:
         self._sent_state: tuple[object, ...] | None = ()
         self._sent_events: tuple[object, ...] | None = ()
         self._sent_snapshot: tuple[object, ...] = ()
-        self._has_drawn = True
+        self._undrawn = 0
         self._sent_listing: Message = {}
 
     async def run(self) -> None:
@@ -65,9 +68,9 @@ class Page:
             with contextlib.suppress(asyncio.CancelledError):
                 await showing
 
-    async def _take(self, message: Viewport | Command | None) -> None:
-        if message is None:
-            self._has_drawn = True
+    async def _take(self, message: Viewport | Command | int) -> None:
+        if isinstance(message, int):
+            self._undrawn = max(0, self._undrawn - message)
             return
         if isinstance(message, Viewport):
             self._viewport = message
@@ -124,8 +127,10 @@ class Page:
                 await self._send(listing)
 
     async def _send_snapshot(self) -> None:
-        if self._has_drawn and (made := self._viewer.snapshot(self._viewport)) and made[0] != self._sent_snapshot:
-            self._sent_snapshot, self._has_drawn = made[0], False
+        if self._undrawn >= _MOST_UNDRAWN:
+            return
+        if (made := self._viewer.snapshot(self._viewport)) and made[0] != self._sent_snapshot:
+            self._sent_snapshot, self._undrawn = made[0], self._undrawn + 1
             await self._socket.send_bytes(made[1])
 
     async def _send(self, message: Message) -> None:
@@ -146,8 +151,8 @@ class Command:
     arguments: Message
 
 
-def parse_message(text: str) -> Viewport | Command | None:
-    """Returns what a text says: ``watch`` as a viewport, ``command`` as a command, ``drawn`` as None.
+def parse_message(text: str) -> Viewport | Command | int:
+    """Returns what a text says: ``watch`` as a viewport, ``command`` as a command, ``drawn`` as how many snapshots.
 
     Raises:
         BadMessage: it says anything else.
@@ -160,7 +165,10 @@ def parse_message(text: str) -> Viewport | Command | None:
         case {"type": "watch"}:
             return _watch(message)
         case {"type": "drawn"}:
-            return None
+            count = message.get("snapshots", 1)
+            if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+                raise BadMessage("drawn.snapshots must be a whole number above 0.")
+            return count
         case {"type": "command", "id": int(number), "verb": str(verb)}:
             token, arguments = message.get("token"), message.get("arguments", {})
             if isinstance(arguments, dict):

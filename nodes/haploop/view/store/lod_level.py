@@ -6,15 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Up to so many values a group are gone through one after the other.
-_FEW = 16
-
 
 def extremes(values: np.ndarray, group: int) -> np.ndarray:
-    """Returns the least and the greatest of every ``group`` consecutive values, in the order in which they came.
+    """Returns the least and the greatest of every ``group`` consecutive values, the least first where they rise.
 
-    A line through the result covers the same band as one through all values, and the extremes of such extremes are
-    those of the values themselves, so decimation can be repeated. NaN counts for nothing.
+    They rise unless the last is less than the first: so the two stand in the order in which they came wherever the
+    values turn once at most. A line through the result covers the same band as one through all values, and the extremes
+    of such extremes are those of the values themselves, so decimation can be repeated. NaN counts for nothing.
 
     Args:
         values: shape (columns, count), ``count`` a multiple of ``group``.
@@ -23,30 +21,13 @@ def extremes(values: np.ndarray, group: int) -> np.ndarray:
         Shape (columns, 2 * count / group); NaN where a group holds nothing else.
     """
     columns, count = values.shape
-    groups = values.reshape(columns, count // group, group)
-    least, greatest, rises = _of_few(groups) if group <= _FEW else _of_many(groups)
+    # Place by place, each in one piece of memory: several times as quick as along the groups.
+    places = np.ascontiguousarray(values.reshape(columns, count // group, group).transpose(2, 0, 1))
+    least, greatest, falls = np.fmin.reduce(places), np.fmax.reduce(places), places[-1] < places[0]
     pairs = np.empty((columns, count // group, 2))
-    pairs[..., 0] = np.where(rises, least, greatest)
-    pairs[..., 1] = np.where(rises, greatest, least)
+    pairs[..., 0] = np.where(falls, greatest, least)
+    pairs[..., 1] = np.where(falls, least, greatest)
     return pairs.reshape(columns, 2 * (count // group))
-
-
-def _of_few(groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns least, greatest and whether the least came first, value after value, which is quicker than by axis."""
-    least = greatest = groups[..., 0]
-    rises = np.ones(least.shape, bool)
-    for place in range(1, groups.shape[2]):
-        now = groups[..., place]
-        rises |= now > greatest
-        rises &= ~(now < least)
-        least, greatest = np.fmin(least, now), np.fmax(greatest, now)
-    return least, greatest, rises
-
-
-def _of_many(groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    least, greatest = np.fmin.reduce(groups, axis=2), np.fmax.reduce(groups, axis=2)
-    rises = (groups == least[..., None]).argmax(axis=2) <= (groups == greatest[..., None]).argmax(axis=2)
-    return least, greatest, rises
 
 
 class Ring:

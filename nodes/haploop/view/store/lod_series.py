@@ -14,8 +14,8 @@ FOLD = 2
 _LEAST_ROWS = 4
 # Buckets that a coarse level holds at least, two values each.
 _BUCKETS = 2048
-# Ticks for which buckets are made at once; fewer are not worth the calls.
-_AT_ONCE_TICKS = 128
+# Ticks for which buckets are made at once, and buckets of the coarser levels; fewer are not worth the calls.
+_AT_ONCE_TICKS, _AT_ONCE_BUCKETS = 128, 8
 # Columns that are kept, at most: elements come and go.
 MOST_COLUMNS = 48
 
@@ -115,7 +115,7 @@ class LodSeries:
             self._add_level()
         above = self._levels[depth + 1]
         buckets = (below.end - above.end) // above.ticks
-        if buckets * above.ticks >= (_AT_ONCE_TICKS if depth == 0 else 1):
+        if buckets >= (_AT_ONCE_TICKS // above.ticks if depth == 0 else _AT_ONCE_BUCKETS):
             group = above.ticks // below.ticks * below.values
             above.ring.append(extremes(below.between(above.end, above.end + buckets * above.ticks), group))
             self._propagate(depth + 1)
@@ -156,7 +156,7 @@ class LodSeries:
         return tick - (tick - self.origin) % bucket_ticks
 
     def envelope(self, names: Sequence[str], from_tick: int, to_tick: int, bucket_ticks: int) -> np.ndarray:
-        """Returns the extremes of consecutive buckets, in the order in which they came; NaN where there are none.
+        """Returns the :func:`extremes` of consecutive buckets, NaN where there are none.
 
         Args:
             from_tick, to_tick: begin of the first bucket and end of the last one, ``aligned``.

@@ -7,7 +7,7 @@ import io
 import os
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +64,17 @@ def keep_prints(role: str, file: Path) -> None:
         os.dup2(descriptor, 1)
         os.dup2(descriptor, 2)
     sys.stdout, sys.stderr = NodeOutput(role, descriptor), NodeOutput(role, descriptor)
+
+
+@contextlib.contextmanager
+def unheard() -> Iterator[None]:
+    """Sends nowhere what is printed meanwhile, by code that has printed it before, in the run that is repeated."""
+    with (
+        Path(os.devnull).open("w", encoding="utf-8") as nowhere,
+        contextlib.redirect_stdout(nowhere),
+        contextlib.redirect_stderr(nowhere),
+    ):
+        yield
 
 
 def mark_ticks(tick: Callable[[], int]) -> None:

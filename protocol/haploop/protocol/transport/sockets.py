@@ -28,6 +28,8 @@ _OPTIONS: dict[int, tuple[tuple[int, int], ...]] = {
 }
 # A peer that has connected must have shown its key by then.
 _HANDSHAKE_MS = 10_000
+# A plain number: the bits of an enumeration take as long as the question itself.
+_POLLIN = int(zmq.POLLIN)
 # The kernel's limit on the path of an ipc socket.
 _LONGEST_PATH = 107
 
@@ -212,7 +214,7 @@ def connect(socket: zmq.Socket[bytes], address: str, key: str | None = None) -> 
 
 def has_message(socket: zmq.Socket[bytes]) -> bool:
     """Tells whether a message is there to be taken."""
-    return bool(int(socket.get(zmq.EVENTS)) & zmq.POLLIN)
+    return bool(int(socket.get(zmq.EVENTS)) & _POLLIN)
 
 
 def bind(socket: zmq.Socket[bytes], directory: Path, name: str) -> str:

@@ -6,24 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from haploop.launch.stability.judge import judge_scene
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.changes import assumed_otherwise, changed_limits, changes, idealised
 from haploop.tools.advise.known import PUBLISHED, Formula, Published, formulas
 from haploop.tools.advise.search import Found, search
 from haploop.tools.advise.subject import Assumed, Subject
-from haploop.tools.advise.walls.cases import (
-    ASSUMED,
-    Case,
-    as_described,
-    every_case,
-    is_number,
-    make_loop,
-    ranges,
-    task_words,
-)
+from haploop.tools.advise.walls.cases import Case, every_case, make_loop, task_words
+from haploop.tools.advise.walls.corners import ASSUMED, as_built, is_number, quantity, ranges
 from haploop.tools.advise.walls.limit import Limit
-from haploop.tools.advise.walls.trial import Failure, Trial, Tried
+from haploop.tools.advise.walls.store import Failure, Tried
+from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.linear.linearity import installed_kinds
 
 # An advice as one JSON object.
@@ -33,7 +27,9 @@ UPPER_BOUND = (
     "as no device is. Give --delay and a [transmission]."
 )
 ADVICE = "Advice on {name}."
-VARIED, HALVED, NOT_VARIED = "Varied by 20 %: {0}.", "Halved and doubled: {0}.", "Not varied: {0}."
+VARIED, HALVED, NOT_VARIED = "Varied by 20 %: {0}.", "Halved and doubled: {0}.", "Not varied, as built: {0}."
+# Walls on which the case that breaks first is shown, as multiples of that which broke.
+_STIFFER, _UNSTEADY = (1.0, 1.05, 1.1, 1.2, 1.4, 1.7, 2.0), ("limit-cycle", "growing", "diverged")
 _RIGID = "There is no [transmission]: what a resonance of the structure takes is not in it."
 _PLUGIN = "The scene's own wall is not tried: its elements come from a plugin file."
 HOLDS_MORE = (
@@ -41,7 +37,7 @@ HOLDS_MORE = (
     "tried in every corner; `haploop compare` tells what it holds."
 )
 FELL = "With {0} it bears {1:.2g} N/mm in every corner at three holds; tried further, it fails from {2:.2g} N/mm on."
-NO_OTHER = "With none of these, at seven parameters each, does the loop as described bear {0:.2g} N/mm: {1}."
+NO_OTHER = "None of these bears {0:.2g} N/mm in the loop as described, at seven parameters each: {1}."
 READING = (
     "Every corner: what is uncertain 20 % more or less, what is assumed half or twice, in all combinations, or 32 of "
     "more; a dash where an element allows no tenth more than the wall alone; * where stiffer walls bear what a softer "
@@ -78,6 +74,7 @@ class Advice:
         assumed: each assumed number with the limit at half and at double of it.
         own: of a scene with a wall: its stiffness, and what it does with its own elements; None where it bears all.
         scene: that shows the advised wall; None where nothing is safe.
+        breaks: that shows the case which breaks first, on the softest wall on which its verdict is not steady.
     """
 
     name: str
@@ -95,6 +92,7 @@ class Advice:
     assumed: tuple[tuple[Assumed, Limit, Limit], ...]
     own: tuple[float, Failure | None] | None
     scene: Scene | None
+    breaks: Scene | None
     runs: int
 
     @property
@@ -143,7 +141,7 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
         is_ideal=is_ideal(loop),
         tried_by=task_words(loop),
         uncertain=(of := ranges(loop, keys)),
-        not_varied=as_described(loop, of),
+        not_varied=as_built(loop, of),
         found=found,
         formulas=tuple(formulas(loop)),
         published=PUBLISHED.get(subject.name, ()),
@@ -152,7 +150,8 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
         without=without,
         assumed=tuple((of, by_number[of.key, 0.5], by_number[of.key, 2.0]) for of in assumed),
         own=own,
-        scene=_shown(subject, loop, found),
+        scene=_shown(subject, loop, found, found.stiffness_N_m, Case(1.0)),
+        breaks=_breaking(subject, loop, found),
         runs=trial.runs,
     )
 
@@ -162,7 +161,7 @@ def reach(uncertain: Mapping[str, tuple[float, float]], not_varied: Sequence[str
     wide = [name for name, ends in uncertain.items() if ends == ASSUMED]
     varied = [name for name in uncertain if name not in wide]
     told = zip((NOT_VARIED, VARIED, HALVED), (not_varied, varied, wide), strict=True)
-    return " ".join(sentence.format(", ".join(names)) for sentence, names in told if names)
+    return " ".join(sentence.format(", ".join(map(quantity, names))) for sentence, names in told if names)
 
 
 def is_ideal(loop: Scene) -> bool:
@@ -171,16 +170,27 @@ def is_ideal(loop: Scene) -> bool:
     return not lags and not loop.clock.round_trip_delay
 
 
-def _shown(subject: Subject, loop: Scene, found: Found) -> Scene | None:
-    """Returns the task's own hold and sway on the advised wall."""
-    if not found.stiffness_N_m:
+def _shown(subject: Subject, loop: Scene, found: Found, stiffness_N_m: float, case: Case) -> Scene | None:
+    """Returns a case on a wall with the advised element; None on no wall."""
+    if not stiffness_N_m:
         return None
-    best, scene = found.advised, Case(1.0).scene(loop)
-    title = f"{subject.name}: {found.stiffness_N_m / 1e3:g} N/mm with {best.family.phrase(best.values)}"
+    best, scene = found.advised, case.scene(loop)
+    title = f"{subject.name}: {stiffness_N_m / 1e3:.3g} N/mm with {best.family.phrase(best.values)}, {case.words}"
     assert scene.wall
-    wall = replace(scene.wall, stiffness=found.stiffness_N_m)
+    wall = replace(scene.wall, stiffness=stiffness_N_m)
     elements = best.family.elements(best.values)
     return replace(scene, title=title, wall=wall, dissipation=elements, run=subject.scene.run)
+
+
+def _breaking(subject: Subject, loop: Scene, found: Found) -> Scene | None:
+    """Returns the case that breaks first on the softest wall, from that which it broke on, that is not steady there.
+
+    What broke by its force alone, or with friction as projected in arrays, a run may yet call steady.
+    """
+    if not found.breaks or not (case := found.breaks[1].tried):
+        return None
+    shown = (_shown(subject, loop, found, found.breaks[0] * share, case) for share in _STIFFER)
+    return next((scene for scene in shown if scene and judge_scene(scene, installed_kinds()).word in _UNSTEADY), None)
 
 
 def advice_data(told: Advice, sentences: list[str]) -> AdviceData:
@@ -193,5 +203,5 @@ def advice_data(told: Advice, sentences: list[str]) -> AdviceData:
         "safe_means": SAFE_MEANS,
         "reading": READING,
         "advice": " ".join(sentences),
-        **asdict(replace(told, scene=None)),
+        **asdict(replace(told, scene=None, breaks=None)),
     }

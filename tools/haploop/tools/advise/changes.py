@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from haploop.launch.plan.effects import all_effects
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.advise.walls.cases import ASSUMED, DELAY, FIRST_HOLDS, Case, delay_s
+from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case
+from haploop.tools.advise.walls.corners import ASSUMED, DELAY, delay_s, scale_quantities
 from haploop.tools.advise.walls.limit import Limit, Query, ladder, limits
 from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.advise.withstand import Best
@@ -32,7 +33,7 @@ _ADDED_DAMPING = 1.0
 
 def changes(loop: Scene) -> dict[str, Scene]:
     """Returns the loops with one change each, by what is changed; only what is there and not 0 can be."""
-    found = {words: scaled(loop, key, factor) for words, key, factor in _SCALED if value_at(loop, key)}
+    found = {words: scale_quantities(loop, {key: factor}) for words, key, factor in _SCALED if value_at(loop, key)}
     clock = loop.clock
     key = "transmission.motor_damping" if loop.transmission else "device.damping"
     found[f"{_ADDED_DAMPING:g} N s/m of viscous damping added"] = with_value(
@@ -61,7 +62,7 @@ def idealised(loop: Scene) -> dict[str, Scene]:
 
 def assumed_otherwise(loop: Scene, keys: Sequence[str]) -> dict[tuple[str, float], Scene]:
     """Returns the loops with one assumed number halved or doubled, by (key, factor)."""
-    return {(key, factor): scaled(loop, key, factor) for key in keys for factor in ASSUMED}
+    return {(key, factor): scale_quantities(loop, {key: factor}) for key in keys for factor in ASSUMED}
 
 
 def scaled(loop: Scene, key: str, factor: float) -> Scene:

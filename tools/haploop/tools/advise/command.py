@@ -18,13 +18,15 @@ from haploop.tools.advise.figure import draw
 from haploop.tools.advise.report import report, sentences
 from haploop.tools.advise.subject import InvalidRequest, make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop
-from haploop.tools.advise.walls.trial import Store, Trial
+from haploop.tools.advise.walls.store import Store
+from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with, print_notes
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.terminal import console
 
-ADVICE, SCENE, FIGURE, WALLS = "advice.json", "advice.toml", "figure.png", "walls.jsonl"
+ADVICE, FIGURE, WALLS = "advice.json", "figure.png", "walls.jsonl"
+_SCENE, _BREAKS = "advice.toml", "advice_breaks.toml"
 
 
 def advise(
@@ -76,9 +78,10 @@ def _output(out: Path | None, name: str) -> Path:
 def _write(found: Advice, out: Path) -> AdviceData:
     files, data = {}, advice_data(found, sentences(found))
     try:
-        if found.scene:
-            (out / SCENE).write_text(to_toml(found.scene.as_dict()), encoding="utf-8")
-            files["scene"] = str(out / SCENE)
+        for key, name, scene in (("scene", _SCENE, found.scene), ("breaks", _BREAKS, found.breaks)):
+            if scene:
+                (out / name).write_text(to_toml(scene.as_dict()), encoding="utf-8")
+                files[key] = str(out / name)
         with contextlib.suppress(FigureError):
             files["figure"] = str(draw(found, out / FIGURE))
         files["data"] = str(out / ADVICE)

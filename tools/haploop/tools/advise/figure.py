@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from haploop.tools.advise.advice import Advice
 from haploop.tools.advise.report import format_limit, format_stiffness, moves, sentences
+from haploop.tools.advise.walls.limit import Limit
+from haploop.tools.advise.withstand import WORTH
 from haploop.tools.figure import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_WIDTH_IN, _ROW_IN, _BESIDE_IN = 11.0, 0.36, 1.5
-_BAR = 0.62
+_WIDTH_IN, _ROW_IN, _BESIDE_IN = 11.0, 0.37, 1.6
 _LETTERS = 118
+_DOT = 7.0
+_LIGHT, _SOFTER = "white", "#B07A45"
+# Right ends of the columns of numbers beside the axes, in points.
+_COLUMNS = 90, 175
+# Numbers at which an axis may begin and end, in every decade.
+_ENDS = (1.0, 2.0, 5.0)
 
 
 def draw(told: Advice, target: Path) -> Path:
@@ -27,13 +35,14 @@ def draw(told: Advice, target: Path) -> Path:
 def figure_of(told: Advice) -> Figure:
     """Makes two panels: the limits of every element with formulas and published values, and those of changed devices.
 
+    Dots on one logarithmic axis, on which the length of a bar would mean nothing; the numbers stand beside it.
+
     Raises FigureError where matplotlib is missing.
     """
     changed = (*told.changed, *told.without)
-    others = [(row.words, row.limit.stiffness_N_m, format_limit(row.limit)) for row in changed]
+    others = [(row.words, row.limit) for row in changed]
     for of, half, double in (row for row in told.assumed if moves(row[1], row[2], told.described)):
-        others += [(f"{of.key} halved (assumed)", half.stiffness_N_m, format_limit(half))]
-        others += [(f"{of.key} doubled (assumed)", double.stiffness_N_m, format_limit(double))]
+        others += [(f"{of.key} halved (assumed)", half), (f"{of.key} doubled (assumed)", double)]
     lines = [line for sentence in sentences(told) for line in textwrap.wrap(sentence, _LETTERS)]
     heights = [
         (len(told.found.bests) + len(told.formulas) + len(told.published)) * _ROW_IN + _BESIDE_IN + 0.2 * len(lines),
@@ -41,73 +50,100 @@ def figure_of(told: Advice) -> Figure:
     ]
     figure = style.empty_figure(_WIDTH_IN, sum(heights))
     above, below = figure.subplots(2, 1, height_ratios=heights)
-    _walls(above, told, lines)
-    _changes(below, told, others)
+    stiffnesses = [_walls(above, told, lines), _changes(below, told, others)]
+    for ax in (above, below):
+        ax.set_xlim(*_ends([value / 1e3 for values in stiffnesses for value in values]))
+        ax.set_xscale("log")
+        style.plain_numbers(ax.xaxis)
     return figure
 
 
-def _walls(ax: Axes, told: Advice, lines: list[str]) -> None:
-    """Draws a light bar for the loop as described, a dark one for every corner, a mark for what is known."""
-    found, names = told.found, []
-    ends = [end for best in found.bests for end in (best.nominal.stiffness_N_m, found.stiffness_N_m)]
+def _walls(ax: Axes, told: Advice, lines: list[str]) -> list[float]:
+    """Marks the loop as described, every corner, and what is known; returns the stiffnesses, N/m."""
+    found, names, marked = told.found, [], []
     for row, best in enumerate(found.bests):
-        is_advised = best is found.advised
+        is_advised, nominal = best is found.advised, best.nominal.stiffness_N_m
         safe = found.stiffness_N_m if is_advised else best.safe.stiffness_N_m if best.safe else 0.0
-        safe = min([safe, *(below for fallen, below in found.fell if fallen.family is best.family)])
-        labels = ("_", "_") if row else ("as described", "in every corner")
-        end = best.nominal.stiffness_N_m
-        ax.barh(row, end / 1e3, _BAR, color=style.WALL_FILL, edgecolor=style.WALL, linewidth=0.8, label=labels[0])
-        ax.barh(row, safe / 1e3, _BAR, color=style.WALL, label=labels[1])
-        words = f"{format_limit(best.nominal)} {best.family.words(best.values) if best.values else ''}"
-        if is_advised:
-            words += f"   {'at most' if told.is_ideal else 'safe'}: {format_stiffness(safe)}"
-        _beside(ax, max(end, safe), row, words, is_advised)
-        names.append(best.family.name)
-    known = [(f"{row.formula} ({row.source})", row.stiffness_N_m) for row in told.formulas]
-    known += [(f"published: {value.by}", value.stiffness_N_m) for value in told.published]
-    for row, (name, stiffness) in enumerate(known, len(found.bests)):
-        colour = style.ELEMENTS[0] if row < len(found.bests) + len(told.formulas) else style.ELEMENTS[1]
-        names.append(name)
-        if 0.0 < stiffness < 1e9:
-            ends.append(stiffness)
-            ax.plot([stiffness / 1e3], [row], "D", color=colour, markersize=6)
-        _beside(ax, stiffness if stiffness < 1e9 else 0.0, row, format_stiffness(stiffness))
+        safe = safe if best.values else found.alone_N_m
+        fails = min((below for fallen, below in found.fell if fallen.family is best.family), default=math.inf)
+        fell, safe = fails <= safe, min(safe, fails)
+        ends = [end for end in (safe, nominal) if end]
+        ax.plot([end / 1e3 for end in ends], [row] * len(ends), color=style.WALL, linewidth=1.0, zorder=2)
+        _mark(ax, row, nominal, "o", style.WALL, "" if row else "as described", face=_LIGHT)
+        _mark(ax, row, safe, "<" if fell else "o", style.WALL, "" if row else "in every corner")
+        numbers = ("below " * fell + format_stiffness(safe) if safe else "–"), format_limit(best.nominal)
+        _beside(ax, row, numbers, is_advised)
+        names.append(f"{best.family.name}\n{best.family.words(best.values)}" if best.values else best.family.name)
+        marked += ends
+    formulas = [(f"{row.formula} ({row.source})", row.stiffness_N_m) for row in told.formulas]
+    published = [(f"published: {value.by}", value.stiffness_N_m) for value in told.published]
+    for label, known, colour in (("formula", formulas, style.ELEMENTS[0]), ("published", published, style.ELEMENTS[1])):
+        for place, (name, stiffness) in enumerate(known):
+            drawn = stiffness if stiffness < 1e9 else 0.0
+            _mark(ax, len(names), drawn, "D", colour, "" if place else label)
+            _beside(ax, len(names), ("", format_stiffness(stiffness)))
+            names.append(name)
+            marked.append(drawn)
     title = f"{told.name}: upper bound, not advice" if told.is_ideal else f"{told.name}: how stiff a wall may be"
-    _finish(ax, title, names, ends, lines)
-    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=style.SMALL, frameon=False)
+    _finish(ax, title, names, lines)
+    _beside(ax, -0.85, ("in every corner", "as described"), bold=True)
+    return marked
 
 
-def _changes(ax: Axes, told: Advice, others: list[tuple[str, float, str]]) -> None:
-    nominal = told.described.stiffness_N_m
-    for row, (_, stiffness, words) in enumerate(others):
-        colour = style.VERDICTS["steady"] if stiffness > nominal else "#D9B08C"
-        ax.barh(row, stiffness / 1e3, _BAR, color=colour)
-        _beside(ax, max(stiffness, nominal), row, words)  # no word on the line of the described device
+def _changes(ax: Axes, told: Advice, others: list[tuple[str, Limit]]) -> list[float]:
+    """Marks what every change makes of the loop as described, with a line from it; returns the stiffnesses, N/m."""
+    nominal, seen = told.described.stiffness_N_m, set[str]()
+    for row, (_, limit) in enumerate(others):
+        stiffness = limit.stiffness_N_m
+        size = (stiffness > nominal * WORTH) - (stiffness * WORTH < nominal)
+        colour, label = (
+            (style.GREY, "as stiff within a tenth"),
+            (style.VERDICTS["steady"], "stiffer"),
+            (_SOFTER, "softer"),
+        )[size]
+        if nominal and stiffness:
+            ax.plot([nominal / 1e3, stiffness / 1e3], [row, row], color=colour, linewidth=2.0)
+        _mark(ax, row, stiffness, "o", colour, "" if label in seen or not stiffness else label)
+        seen |= {label} if stiffness else set()
+        _beside(ax, row, ("", format_limit(limit)))
     if nominal:
-        ax.axvline(nominal / 1e3, color=style.INK, linewidth=1.2)
-    title = "the same wall as described, with one change of the device"
-    _finish(ax, title, [name for name, _, _ in others], [nominal, *(stiffness for _, stiffness, _ in others)], [])
+        ax.axvline(nominal / 1e3, color=style.INK, linewidth=1.2, label="as described", zorder=1)
+    _finish(ax, "the same loop as described, with one change of the device", [name for name, _ in others], [])
+    return [nominal, *(limit.stiffness_N_m for _, limit in others)]
 
 
-def _beside(ax: Axes, right: float, row: int, words: str, bold: bool = False) -> None:
-    ax.annotate(
-        words, (right / 1e3, row) if right else (0.0, row), (6, 0),
-        xycoords="data" if right else ax.get_yaxis_transform(), textcoords="offset points",
-        va="center", fontsize=style.SMALL, color=style.INK, fontweight="bold" if bold else "normal",
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.85},
-    )  # fmt: skip
+def _mark(ax: Axes, row: int, stiffness: float, shape: str, colour: str, label: str, face: str = "") -> None:
+    """Draws a mark with its entry in the legend; none where there is no such wall."""
+    if stiffness or label:
+        at = ([stiffness / 1e3], [row]) if stiffness else ([], [])
+        look = {"markersize": _DOT, "markerfacecolor": face or colour, "color": colour, "linestyle": "none"}
+        ax.plot(*at, shape, label=label or "_", zorder=3, **look)
 
 
-def _finish(ax: Axes, title: str, names: list[str], stiffnesses: list[float], lines: list[str]) -> None:
-    """Names the rows; the logarithmic axis leaves room for the words beside the longest bar."""
-    style.dress(ax, title, "wall stiffness, N/mm", "")
+def _beside(ax: Axes, row: float, numbers: tuple[str, str], bold: bool = False) -> None:
+    """Writes a row of the table beside the axes."""
+    look = {"fontsize": style.SMALL, "color": style.INK, "fontweight": "bold" if bold else "normal", "va": "center"}
+    for right, text in zip(_COLUMNS, numbers, strict=True):
+        place = {"xycoords": ax.get_yaxis_transform(), "textcoords": "offset points", "annotation_clip": False}
+        ax.annotate(text, (1.0, row), (right, 0), ha="right", **place, **look)
+
+
+def _ends(stiffnesses: list[float]) -> tuple[float, float]:
+    """Returns the round numbers around the positive ones, 1, 2 or 5 in a decade, for a logarithmic axis."""
+    real = [value for value in stiffnesses if value > 0.0] or [1.0]
+    least, most = min(real) * 0.9, max(real) * 1.1
+    decades = range(math.floor(math.log10(least)) - 1, math.ceil(math.log10(most)) + 2)
+    steps = [digit * 10.0**power for power in decades for digit in _ENDS]
+    return max(step for step in steps if step <= least), min(step for step in steps if step >= most)
+
+
+def _finish(ax: Axes, title: str, names: list[str], lines: list[str]) -> None:
+    """Names the rows, and puts lines of text below the axis and the legend above it."""
+    style.dress(ax, "", "wall stiffness, N/mm", "")
+    ax.set_title(title, loc="left", pad=22, fontsize=style.TEXT + 1, fontweight="bold", color=style.INK)
     ax.set_yticks(range(len(names)), names, fontsize=style.TEXT)
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
-    real = [value / 1e3 for value in stiffnesses if value > 0.0] or [1e-3, 1.0]
-    low, high = min(real) / 2.0, max(real)
-    ax.set_xscale("log")
-    ax.set_xlim(low, high * (high / low) ** 0.5)
-    style.plain_numbers(ax.xaxis)
     text = "\n".join(["wall stiffness, N/mm", *lines])
     ax.set_xlabel(text, loc="left", fontsize=style.TEXT, color=style.GREY, linespacing=1.5)
+    style.legend(ax, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4)

@@ -10,7 +10,8 @@ from haploop.tools.advise.families import HIDING, OTHERS, Family, Values, applie
 from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case
 from haploop.tools.advise.walls.limit import Limit, Query, ladder
 from haploop.tools.advise.walls.rendered import tried
-from haploop.tools.advise.walls.trial import Job, Trial, Tried
+from haploop.tools.advise.walls.store import Job, Tried
+from haploop.tools.advise.walls.trial import Trial
 
 # So many of the other elements are tried in every corner at most.
 _MOST = 2

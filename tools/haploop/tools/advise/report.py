@@ -11,7 +11,7 @@ from rich.text import Text
 from haploop.tools.advise.advice import READING, Advice
 from haploop.tools.advise.changes import CLOSE
 from haploop.tools.advise.walls.limit import Limit
-from haploop.tools.advise.walls.trial import Failure
+from haploop.tools.advise.walls.store import Failure
 from haploop.tools.advise.withstand import ROUGH, WORTH, Best
 from haploop.tools.render.terminal import make_facts, make_table
 from haploop.tools.render.units import amount, fixed
@@ -22,8 +22,9 @@ _NOTHING_BREAKS = "nothing that was tried"
 _TELLS = 1.2
 _NO_CHANGE = "no single change that was tried gains a fifth"
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
+_ALONE = "{0} without one, searched and attacked alike"
 # What is assumed, how much that costs, and what to measure.
-_ASSUMED = "{0}, published nowhere: the wall bears half and twice of {1}. {2}"
+_ASSUMED = "{0}, neither measured nor published: the wall bears half and twice of {1}. {2}"
 _COSTS = "Were {0} right: about {1} with {2}, not attacked. {3}"
 _SAME = "Were {0} right, the wall would be as stiff within a tenth."
 _MEASURE = "Measure {0} first: it moves the wall most."
@@ -53,6 +54,8 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     lines = [("at most" if told.is_ideal else "safe up to", safe if found.stiffness_N_m else _NO_WALL)]
     if found.as_assumed:
         lines.append(("assumes", assumes(told, found.as_assumed)))
+    if found.stiffness_N_m and best.values:
+        lines.append(("no element", _ALONE.format(format_stiffness(found.alone_N_m)) if found.alone_N_m else _NO_WALL))
     broken = found.breaks
     breaks = f"{format_stiffness(broken[0])}: {describe(broken[1])}" if broken else _NOTHING_BREAKS
     lines.append(("breaks first", breaks))

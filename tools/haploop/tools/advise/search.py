@@ -19,8 +19,10 @@ from haploop.tools.advise.families import (
     first_choices,
     together,
 )  # fmt: skip
+from haploop.tools.advise.hardest import hardest
 from haploop.tools.advise.others import Choice, Hidden, hiding, others_bearing, worth_more
-from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, Ranges, attack, every_case, ranges
+from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, attack, every_case
+from haploop.tools.advise.walls.corners import ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, Limit, Query, ladder, limits
 from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.advise.withstand import BEYOND, ROUGH, WORTH, Best, Broken, advised, rivals, withstand
@@ -28,6 +30,8 @@ from haploop.tools.advise.withstand import BEYOND, ROUGH, WORTH, Best, Broken, a
 # Parameters that are tried in every corner, by their places among those that bear as much in the loop as described;
 # what suits a device of half the mass is smaller.
 _MANY, _WIDE, _ONE = (0.0, 0.5, 1.0), (-1.0, 0.0, 1.0), (0.5,)
+# So many of the corners that are hardest on the wall alone take part in that.
+_HARDEST = 6
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,7 @@ class Found:
         cases: how many it was tried in, attack included.
         others: elements that bear no wall of ``simple_N_m`` as described, the best of the simple ones.
         hidden: elements that render less than their wall, and may hold more than any other.
+        alone_N_m: the wall without an element that withstood as much.
         fell: what bore more in every corner, and the softest wall, N/m, known not to bear everything with it.
     """
 
@@ -56,6 +61,7 @@ class Found:
     simple_N_m: float = 0.0
     hidden: tuple[Hidden, ...] = ()
     fell: tuple[tuple[Best, float], ...] = ()
+    alone_N_m: float = 0.0
 
 
 def search(
@@ -70,9 +76,9 @@ def search(
 
     stage("the wall alone")
     known = nominal([(NOTHING, ())], ladder(10.0, 1e5, 1.6), LEAST_N_M)
-    alone = max(10.0 * LEAST_N_M, known[NOTHING, ()].stiffness_N_m)
+    near = max(10.0 * LEAST_N_M, known[NOTHING, ()].stiffness_N_m)
     stage("one element")
-    rungs = ladder(alone / 2.0, alone * 8.0, 1.4), alone / 2.0
+    rungs = ladder(near / 2.0, near * 8.0, 1.4), near / 2.0
     known |= nominal([(family, values) for family in SINGLE for values in first_choices(family, loop)], *rungs)
     more = [(family, values) for family in SINGLE for values in beside(_equals(known, family)[0])]
     known |= nominal([choice for choice in more if choice not in known], *rungs)
@@ -86,23 +92,29 @@ def search(
     good = worth_more(known, simple)
     more = [(family, values) for family in good for values in beside(_equals(known, family)[0])]
     known |= nominal([choice for choice in more if choice not in known], *rungs)
-    hidden = hiding(loop, trial, alone, WORTH * max(limit.stiffness_N_m for limit in known.values()))
+    hidden = hiding(loop, trial, near, WORTH * max(limit.stiffness_N_m for limit in known.values()))
     some = (*SINGLE, BOTH, *good)
     stage("every corner")
     of, measured = ranges(loop, assumed), ranges(loop)
-    bests = _in_corners(loop, trial, known, of, _MANY if of == measured else _WIDE, some)
-    as_assumed = None if of == measured else advised(_in_corners(loop, trial, known, measured, _ONE, some))
+    query = Query(loop, (), every_case(of, FIRST_HOLDS), ladder(near / 4.0, near, 1.6))
+    worst = hardest(loop, trial, (), of, limits(trial, [query], ROUGH)[0].stiffness_N_m)[:_HARDEST]
+    cases, places = every_case(of, FIRST_HOLDS, worst), _MANY if of == measured else _WIDE
+    bests = _in_corners(loop, trial, known, cases, places, some)
+    as_assumed = None
+    if of != measured:
+        as_assumed = advised(_in_corners(loop, trial, known, every_case(measured, FIRST_HOLDS), _ONE, some))
     stage("softer walls and the attack")
-    compared = rivals(bests)
+    compared = rivals(bests, worst)
     won = withstand(loop, trial, compared, of)
+    fell = tuple((each.best, each.broken[0]) for each in compared if each is not won and each.broken)
+    alone = withstand(loop, trial, [rival for rival in compared if rival.best.family is NOTHING], of).bound_N_m
     choice = won.best.family, won.best.values
     described = known.get(choice) or nominal([choice], *rungs)[choice]
     best = replace(won.best, nominal=described)
-    fell = tuple((each.best, each.broken[0]) for each in compared if each is not won and each.broken)
-    cases = len(BEYOND) * len(attack(of)) + len(every_case(of))
+    count = len(BEYOND) * len(attack(of, won.hardest)) + len(every_case(of, hardest=won.hardest))
     shown = tuple(best if each.family is best.family else each for each in bests)
     others = tuple(family for family in OTHERS if family not in good)
-    return Found(shown, best, won.bound_N_m, as_assumed, won.broken, cases, others, simple, hidden, fell)
+    return Found(shown, best, won.bound_N_m, as_assumed, won.broken, count, others, simple, hidden, fell, alone)
 
 
 def _equals(known: dict[Choice, Limit], family: Family) -> list[Values]:
@@ -125,16 +137,16 @@ def _in_corners(
     loop: Scene,
     trial: Trial,
     known: dict[Choice, Limit],
-    of: Ranges,
+    cases: tuple[Case, ...],
     places: Sequence[float],
     families: Sequence[Family],
 ) -> list[Best]:
-    """Returns the wall alone and the best of some families, with limits in every corner, at the holds tried first.
+    """Returns the wall alone and the best of some families, with limits in all the cases.
 
     Of parameters that bear as much in the loop as described those at these places, from the smallest, 0, to the
     largest, 1; below 0 the next that are half of the smallest or less. None is tried below what makes it worth having.
     """
-    cases, alone = every_case(of, FIRST_HOLDS), known[NOTHING, ()]
+    alone = known[NOTHING, ()]
 
     def query(choice: Choice, least_N_m: float) -> Query:
         family, values = choice

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from haploop.launch.stability.judge import judge_scene
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.families import Family, Values, beside
-from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, Ranges, attack, corner, every_case
+from haploop.tools.advise.hardest import hardest
+from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, attack, every_case
+from haploop.tools.advise.walls.corners import Corner, Ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, Limit, Query, ladder, limits
-from haploop.tools.advise.walls.trial import Failure, Trial, Tried
+from haploop.tools.advise.walls.store import Failure, Tried
+from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.linear.linearity import installed_kinds
 
 # How closely limits are found while elements are compared, and that of the one advised.
@@ -24,6 +27,10 @@ _SOFTER = (0.8, 0.62, 0.48, 0.35, 0.25, 0.15, 0.08, 0.03)
 _LOWER, _LEAST = 0.97, 0.16
 # So much stiffer walls have to withstand it, too: where a count lies in the hold is chance, and differs with each.
 BEYOND = (1.0, 1.02, 1.04)
+# Times that parameters are moved, each time in the corners that were hardest on those before.
+_MOVES = 3
+# So many of the hardest corners are pushed.
+_PUSHED = 3
 _STEADY = ("steady", "no-contact")
 # The softest wall known not to bear everything, and what it does.
 Broken = tuple[float, Failure]
@@ -52,6 +59,8 @@ class Rival:
         bound_N_m: no stiffer wall withstands, as far as is known.
         worth: how many times as much as the others it has to bear.
         floor_N_m: the wall is not lowered below; None until softer walls were tried.
+        hardest: corners known to be hard on its walls, the hardest first.
+        broke: cases that broke stiffer ones under attack.
     """
 
     best: Best
@@ -59,18 +68,20 @@ class Rival:
     worth: float
     broken: Broken | None = None
     floor_N_m: float | None = None
+    hardest: tuple[Corner, ...] = ()
+    broke: list[Case] = field(default_factory=list)
 
 
-def rivals(bests: Sequence[Best]) -> list[Rival]:
+def rivals(bests: Sequence[Best], hardest: tuple[Corner, ...] = ()) -> list[Rival]:
     """Returns every family with a limit in every corner, that which would be advised first.
 
-    One with more elements than that has to bear a tenth more than it.
+    One with more elements than that has to bear a tenth more than it. The corners are known to be hard on all of them.
     """
     first = advised(bests)
     found, worth = [], 1.0
     for best in bests:
         if best.safe:
-            found.append(Rival(best, best.safe.stiffness_N_m, worth))
+            found.append(Rival(best, best.safe.stiffness_N_m, worth, hardest=hardest))
         worth = WORTH if best is first else worth
     return sorted(found, key=lambda rival: rival.best is not first)
 
@@ -100,44 +111,63 @@ def withstand(loop: Scene, trial: Trial, some: Sequence[Rival], of: Ranges) -> R
                 return rival
         elif broken := _breaks(loop, trial, rival, of):
             rival.broken = broken
+            if case := broken[1].tried:
+                rival.broke.append(case)
+                rival.hardest = tuple(dict.fromkeys((case.corner, *rival.hardest))) if case.corner else rival.hardest
             rival.bound_N_m = rounded_down(rival.bound_N_m * _LOWER)
         else:
             return rival
 
 
 def _prepare(loop: Scene, trial: Trial, rival: Rival, of: Ranges) -> None:
-    """Moves the parameters of a rival as long as that helps, and tries it at every hold, and softer walls."""
-    values, safe = _refined(loop, trial, rival.best, of)
-    rival.best = replace(rival.best, values=values, safe=safe)
-    top = _softer(loop, trial, rival.best, of)
+    """Moves the parameters of a rival as long as that helps, and tries it at every hold, and softer walls.
+
+    That is in the corners that are hardest on it, too, before and after.
+    """
+    for _ in range(_MOVES):
+        values = rival.best.values
+        if rival.best.safe and (near := rival.best.safe.stiffness_N_m):
+            found = hardest(loop, trial, rival.best.family.elements(values), of, near)
+            rival.hardest = tuple(dict.fromkeys((*found, *rival.hardest)))
+            if values:
+                _refine(loop, trial, rival, of)
+        if rival.best.values == values:
+            break
+    top = _softer(loop, trial, rival, of)
     rival.broken = (top.fails_N_m, top.failure) if top.failure else None
     rival.bound_N_m = rounded_down(top.stiffness_N_m)
     rival.floor_N_m = rival.bound_N_m * _LEAST
 
 
-def _refined(loop: Scene, trial: Trial, best: Best, of: Ranges) -> tuple[Values, Limit]:
-    """Returns parameters moved half a step up or down, as often as that bears more in every corner, and their limit."""
-    assert best.safe
-    values, safe, tried = best.values, best.safe, {best.values}
-    while near := safe.stiffness_N_m:
-        new = [other for other in beside(values) if other not in tried]
-        rungs, cases = ladder(near, near * 1.5, 1.07), every_case(of, FIRST_HOLDS)
-        found = limits(trial, [Query(loop, best.family.elements(each), cases, rungs) for each in new], ROUGH / 2.0)
+def _refine(loop: Scene, trial: Trial, rival: Rival, of: Ranges) -> None:
+    """Moves parameters half a step up or down, as often as that bears more in every corner known to be hard."""
+    cases = every_case(of, FIRST_HOLDS, rival.hardest)
+
+    def found(some: Sequence[Values], rungs: tuple[float, ...]) -> list[tuple[Values, Limit]]:
+        queries = [Query(loop, rival.best.family.elements(each), cases, rungs) for each in some]
+        return list(zip(some, limits(trial, queries, ROUGH / 2.0), strict=True))
+
+    assert rival.best.safe
+    near = rival.best.safe.stiffness_N_m
+    [best], tried = found([rival.best.values], ladder(near * 0.7, near, 1.2)), {rival.best.values}
+    while near := best[1].stiffness_N_m:
+        new = [other for other in beside(best[0]) if other not in tried]
         tried |= set(new)
-        more = max(zip(new, found, strict=True), key=lambda each: each[1].stiffness_N_m, default=None)
-        if not more or more[1].stiffness_N_m <= near * 1.01:
+        more = max(found(new, ladder(near, near * 1.5, 1.07)), key=lambda each: each[1].stiffness_N_m, default=best)
+        if more[1].stiffness_N_m <= near * 1.01:
             break
-        values, safe = more
-    return values, safe
+        best = more
+    rival.best = replace(rival.best, values=best[0], safe=best[1])
 
 
-def _softer(loop: Scene, trial: Trial, best: Best, of: Ranges) -> Limit:
+def _softer(loop: Scene, trial: Trial, rival: Rival, of: Ranges) -> Limit:
     """Returns the limit at every hold in every corner, with all softer walls bearing it, too."""
+    best = rival.best
     assert best.safe
     near = best.safe.stiffness_N_m
     if not near:
         return best.safe
-    elements, cases = best.family.elements(best.values), every_case(of)
+    elements, cases = best.family.elements(best.values), every_case(of, hardest=rival.hardest)
     rungs = (*sorted(near * share for share in _SOFTER), near, min(best.safe.fails_N_m, near * 1.1))
     return limits(trial, [Query(loop, elements, cases, rungs)], _FINE)[0]
 
@@ -145,25 +175,29 @@ def _softer(loop: Scene, trial: Trial, best: Best, of: Ranges) -> Limit:
 def _breaks(loop: Scene, trial: Trial, rival: Rival, of: Ranges) -> Broken | None:
     """Attacks a wall and slightly stiffer ones: projected friction in every case, exact friction in a few."""
     elements = rival.best.family.elements(rival.best.values)
-    found = trial.failures(loop, [Tried(share * rival.bound_N_m, elements) for share in BEYOND], attack(of))
-    broke = ((share, each) for share, each in zip(BEYOND, found, strict=True) if each)
-    share, failure = next(broke, None) or (1.0, _judged(loop, Tried(rival.bound_N_m, elements), of))
-    return (share * rival.bound_N_m, failure) if failure else None
+    walls = [Tried(share * rival.bound_N_m, elements) for share in BEYOND]
+    for cases in ((*rival.broke,), attack(of, rival.hardest)):  # what broke a stiffer one is tried first
+        for wall, failure in zip(walls, trial.failures(loop, walls, cases) if cases else (), strict=False):
+            if failure:
+                return wall.stiffness_N_m, failure
+    failure = _judged(loop, walls[0], rival.hardest)
+    return (rival.bound_N_m, failure) if failure else None
 
 
-def _judged(loop: Scene, wall: Tried, of: Ranges) -> Failure | None:
-    """Judges the wall by pushes and with exact friction, see ``haploop.launch.stability``, in the cases tried first.
+def _judged(loop: Scene, wall: Tried, corners: Sequence[Corner]) -> Failure | None:
+    """Judges the wall by pushes and with exact friction, see ``haploop.launch.stability``, at the holds tried first.
 
-    They are the loop as described and the likely worst corner, in which all that is uncertain is least.
+    That is in the loop as described and in the hardest corners.
     """
-    for case in (Case(hold, some, sway=0.0) for some in ((), corner(of, 0)) for hold in FIRST_HOLDS):
+    for case in (Case(hold, some, sway=0.0) for some in ((), *corners[:_PUSHED]) for hold in FIRST_HOLDS):
         scene = case.scene(loop)
         assert scene.wall
         scene = replace(scene, wall=replace(scene.wall, stiffness=wall.stiffness_N_m), dissipation=wall.elements)
         found = judge_scene(scene, installed_kinds())
         if found.word not in _STEADY and not (found.word == "limit-cycle" and not found.felt):
             numbers = found.width_m, found.force_ripple_N, found.frequency_Hz
-            return Failure(f"{case.words}, pushed: {found.word}", scene.duration, found.word == "diverged", *numbers)
+            words = f"{case.words}, pushed: {found.word}"
+            return Failure(words, scene.duration, found.word == "diverged", *numbers, tried=case)
     return None
 
 

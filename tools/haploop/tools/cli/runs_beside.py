@@ -21,8 +21,20 @@ _WORDS = {
     "ended": ("ended", ""),
     "logged_s": ("log ends at", "s"),
     "oscillation_m": ("oscillation at its end", "m"),
-    "frequency_Hz": ("pushed, it swings at", "Hz"),
+    "force_swing_N": ("force, peak to peak", "N"),
+    "force_ripple_N": ("  of it above 30 Hz", "N"),
+    "width_m": ("pushed, it swings by", "m"),
+    "frequency_Hz": ("  at", "Hz"),
     "trajectory_sha256": ("trajectory hash", ""),
+}
+# Logged columns of the controller in words.
+_COLUMNS = {
+    "x": "the measured position",
+    "v": "the estimated velocity",
+    "a": "the estimated acceleration",
+    "wall": "the force of the wall",
+    "total": "the force of wall and elements together",
+    "in_contact": "whether there is contact",
 }
 
 
@@ -74,12 +86,13 @@ def difference_table(found: Difference) -> RenderableType:
     from rich.console import Group
     from rich.text import Text
 
+    from haploop.tools.figure.data import TOGETHER
     from haploop.tools.figure.difference import scene_value
     from haploop.tools.render.terminal import make_table, verdict_style
     from haploop.tools.render.units import amount
 
-    table = make_table("", "first", "second", unbroken=("",))
-    table.add_row("name", *(Text(name, "bold") for name in found.names))
+    table = make_table("", *found.runs, unbroken=("",))
+    table.add_row("title", *(Text(name, "bold") for name in found.names))
     table.add_section()
     for key, pair in found.scene.items():
         table.add_row(Text(key), *(Text(scene_value(value)) for value in pair))
@@ -93,7 +106,9 @@ def difference_table(found: Difference) -> RenderableType:
         table.add_row(words, *(Text(text, style) for text, style in zip(told, styles, strict=True)))
     table.add_section()
     for name, pair in found.energies_J.items():
-        table.add_row(Text(name), *(amount(value, "J") for value in pair))
+        table.add_row(
+            Text("wall and elements together" if name == TOGETHER else name), *(amount(value, "J") for value in pair)
+        )
     return Group(table, Text(parting_words(found), "bold"))
 
 
@@ -103,7 +118,9 @@ def parting_words(found: Difference) -> str:
         return found.why_not
     if found.parting is None:
         return f"Every bit of the {found.ticks} ticks that both logs hold is the same."
-    return f"They part at tick {found.parting.tick}, at {found.parting.at_s:g} s, in {found.parting.column}."
+    tick, at_s, column = found.parting.tick, found.parting.at_s, found.parting.column
+    what = f"{_COLUMNS[column]} (column {column})" if column in _COLUMNS else f"column {column}"
+    return f"They part at tick {tick}, at {at_s:g} s: up to there every bit is the same, then {what} differs first."
 
 
 def _result(value: Any, unit: str) -> str:

@@ -64,7 +64,8 @@ def check(
                 force[name] = f"{len(force[name])} numbers from {min(force[name]):g} to {max(force[name]):g}"
         print(to_toml(tables), end="", flush=True)
         with_a = " with a plant of yours (--node plant=COMMAND)" if hand_is_unmodelled(resolved) else ""
-        print(f"{scene} can be run{with_a}.", file=sys.stderr)
+        no_wall = "" if resolved.wall else " It has no [wall]: nothing pushes the device back."
+        print(f"{scene} can be run{with_a}.{no_wall}", file=sys.stderr)
         print_notes(resolved, kinds)
 
 
@@ -91,10 +92,12 @@ def _parameters(element: type[Element]) -> dict[str, dict[str, str | float | Non
 def replay(directory: Directory, json: Json = False) -> None:
     """Repeat a run from its log and say whether all bits agree."""
     from haploop.launch.runs import replay as runs
+    from haploop.protocol.transport.prints import unheard
 
     with plain_errors(), redirect_stdout(sys.stderr):
         try:
-            result = runs.replay(directory)
+            with unheard():
+                result = runs.replay(directory)
         except runs.ReplayError as error:
             leave(str(error), WRONG_USE)
     print_note(result.cut)
@@ -120,6 +123,7 @@ def judge(directory: Directory, json: Json = False) -> None:
     """
     from haploop.launch.runs.replay import ReplayError, demand_own, logged_run, repeatable
     from haploop.launch.stability.judge import judge_scene
+    from haploop.protocol.transport.prints import unheard
     from haploop.tools.render.report import finding_table
     from haploop.tools.render.terminal import console
 
@@ -127,9 +131,10 @@ def judge(directory: Directory, json: Json = False) -> None:
         try:
             recorded = logged_run(directory)
             print_note(recorded.cut)
-            scene, kinds, events = repeatable(directory, recorded)
-            demand_own(recorded, scene)
-            finding = judge_scene(scene, kinds, events)
+            with unheard():
+                scene, kinds, events = repeatable(directory, recorded)
+                demand_own(recorded, scene)
+                finding = judge_scene(scene, kinds, events)
         except ReplayError as error:
             leave(str(error), WRONG_USE)
     if json:

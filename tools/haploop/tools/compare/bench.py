@@ -12,10 +12,11 @@ from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.changes import scaled
 from haploop.tools.advise.families import STABILIZERS, Family, Values, box, halton
-from haploop.tools.advise.walls.cases import ranges
+from haploop.tools.advise.walls.corners import ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, MOST_N_M, Query, ladder, limits
 from haploop.tools.advise.walls.rendered import Trying, tried
-from haploop.tools.advise.walls.trial import Store, Trial
+from haploop.tools.advise.walls.store import Store
+from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.compare.conditions import draw
 
 # How closely limits are found while parameters are compared, and then.

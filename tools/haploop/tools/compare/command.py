@@ -69,11 +69,11 @@ def find(subject: Subject, grid: bool, workers: int | None, rows: Path) -> Compa
     from haploop.tools.advise.walls.cases import make_loop
     from haploop.tools.compare.bench import BESIDE, Effort
     from haploop.tools.compare.comparison import Comparison, Kept, bounded_N_m, compare, variants
-    from haploop.tools.compare.conditions import task_words
+    from haploop.tools.compare.conditions import COMPARED_WITH, task_words
     from haploop.tools.executor.executors import make_executor
     from haploop.tools.render.progress import bars
 
-    loop = make_loop(subject.scene, subject.has_task)
+    loop = make_loop(subject.scene, subject.has_task, COMPARED_WITH)
     loops, effort = variants(loop), Effort()
     if not grid:
         loops = dict([*loops.items()][:1])

@@ -16,7 +16,7 @@ from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Actuator, Scene
 from haploop.tools.advise.families import FORCE_BOUNDING, STABILIZERS, Family, Values
 from haploop.tools.advise.walls.rendered import Rendered, Trying
-from haploop.tools.advise.walls.trial import Failure
+from haploop.tools.advise.walls.store import Failure
 from haploop.tools.compare.bench import Effort, Job, Row, alone, bench
 from haploop.tools.executor.executors import Executor
 from haploop.tools.render.progress import Stage
@@ -189,4 +189,4 @@ def _as_row(data: dict[str, Any]) -> Row:
 
 def _as_trying(data: Sequence[Any]) -> Trying:
     limit_N_m, wall_N_m, shown, fails_N_m, failure = data
-    return Trying(limit_N_m, wall_N_m, Rendered(*shown), fails_N_m, Failure(**failure) if failure else None)
+    return Trying(limit_N_m, wall_N_m, Rendered(*shown), fails_N_m, Failure.from_data(failure) if failure else None)

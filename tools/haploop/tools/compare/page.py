@@ -76,7 +76,7 @@ Loops = dict[Place, OfLoop]
 
 
 def sentences(comparisons: Sequence[Comparison]) -> list[str]:
-    """Returns the five sentences; each name of a loop in them is put there by a condition on its rankings."""
+    """Returns five sentences, parts divided by semicolons; a loop is named where its rankings put it there."""
     loops = {(told.name, of.name): of for told in comparisons for of in told.loops}
     taken: dict[str, list[Place]] = {}
     for place, of in loops.items():
@@ -85,9 +85,9 @@ def sentences(comparisons: Sequence[Comparison]) -> list[str]:
     inertia = "; ".join(versus(UNIDIRECTIONAL, other, loops) for other in (NOTHING, DAMPING, BIDIRECTIONAL))
     adaptive = "; ".join(versus(*pair, loops) for pair in _ADAPTIVE)
     return [
-        f"As described, most is held {'; '.join(_most(told.name, told.loops[0]) for told in comparisons)}.",
-        f"Take {take}: each the first in the list that is told to hold more than no element and less than no other, "
-        "nothing where none is.",
+        f"As described, most is held: {'; '.join(_most(told.name, told.loops[0]) for told in comparisons)}.",
+        f"Take the first in the list that is told to hold more than no element and less than no other, "
+        f"nothing where none is: {take}.",
         _sentence(versus(DAMPING, NOTHING, loops)),
         _sentence(inertia),
         _sentence(f"{adaptive}; {_verdict(loops)}"),
@@ -148,18 +148,27 @@ def _most(device: str, of: OfLoop) -> str:
     (found, tied), alone = best(of), format_stiffness(held(without(of.rows)).value)
     if choice(of).family == NOTHING.name:
         return f"on {device} by no element more than without, {alone}"
-    alike = f"not told from {', '.join(row.family for row in tied)}" if tied else "and more than by every other"
-    return f"on {device} by {found.family}, {format_stiffness(held(found).value)} against {alone} without, {alike}"
+    # Some names have a comma.
+    alike = f"as much may hold: {' / '.join(row.family for row in tied)}" if tied else "more than every other"
+    return f"on {device} by {found.family}, {format_stiffness(held(found).value)} against {alone} without ({alike})"
 
 
 def _sentence(words: str) -> str:
     return f"{words[:1].upper()}{words[1:]}."
 
 
+def _in_lines(sentence: str) -> str:
+    """Returns a sentence with its parts, which semicolons divide, as a list after its colon, or as sentences."""
+    lead, colon, rest = sentence.partition(": ")
+    if not colon:
+        return ". ".join(part[:1].upper() + part[1:] for part in sentence.split("; "))
+    return "\n    - ".join([f"{lead}:", *rest.split("; ")])
+
+
 def page(comparisons: Sequence[Comparison]) -> str:
     """Returns the page in Markdown."""
-    lines = [f"{place}. {words}" for place, words in enumerate(sentences(comparisons), 1)]
-    parts = ["# Stabilizers compared", _INTRO, "## In five sentences", "\n".join(lines)]
+    lines = [f"{place}. {_in_lines(words)}" for place, words in enumerate(sentences(comparisons), 1)]
+    parts = ["# Stabilizers compared", _INTRO, "## In short", "\n".join(lines)]
     parts += [f"![How much more every stabilizer holds, with intervals, and the force it adds]({FIGURE})"]
     parts += [f"{READING} {task_sentence(comparisons[0])}"]
     for told in comparisons:

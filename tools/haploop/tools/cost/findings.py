@@ -123,7 +123,7 @@ def _cell(scene: SceneCost, digit_m: float) -> str:
 
 def _alike_table(cost: Cost) -> FindingTable:
     """Makes a row a method: operations of its step, its time over that of the exact flow, and operations a tick."""
-    by_states = {of.states: of for of in reversed(cost.alike)}
+    by_states = _by_states(cost)
     sizes = sorted(by_states)
     pairs = _alike_pairs(cost)
     rows = []
@@ -141,6 +141,11 @@ def _alike_table(cost: Cost) -> FindingTable:
         *(f"operations a tick within {within}, {scene.name.replace('_', ' ')}" for scene, _ in pairs),
     )
     return FindingTable("alike", "A plant step of every method, written alike", heads, rows)
+
+
+def _by_states(cost: Cost) -> dict[int, AlikeScene]:
+    """Returns the first of the scenes of each number of states: the one whose steps are told."""
+    return {of.states: of for of in reversed(cost.alike)}
 
 
 def _alike_pairs(cost: Cost) -> list[tuple[SceneCost, AlikeScene]]:
@@ -161,7 +166,7 @@ def alike_sentence(cost: Cost) -> str | None:
                 rate=rate(exact.plant_rate),
                 rival=_RIVAL,
                 in_run=fixed(rival.time.median / exact.time.median, 2),
-                alike=interval(_step(of, _RIVAL).arrays),
+                alike=interval(_step(_by_states(cost)[of.states], _RIVAL).arrays),
             )
     return None
 

@@ -140,7 +140,7 @@ def bare_us(scene: Scene) -> float | None:
     """Returns the time of a tick of plant and controller in this process without books, µs, in blocks as in a run."""
     time = Timebase.from_scene(scene)
     plant, controller = Plant(scene, time), Controller(scene, time, registry())
-    length = BlockLength(scene.run.block_ticks)
+    length = BlockLength(time.block_ticks(scene.run))
 
     def block() -> bool:
         until = min(plant.tick + length.ticks, time.ticks)

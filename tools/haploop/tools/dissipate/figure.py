@@ -23,13 +23,18 @@ _AT = (0.04, 0.46, 0.585, 0.71, 0.835, 1.0)
 _MOST = len(style.ELEMENTS)
 # Letters of a line, at most.
 _LINE_LETTERS = 170
+# Height of a line of notes.
+_LINE_IN = 0.17
 _CORNER: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.0, 1.0), "ncols": 1}
 
 
 def make_figure(outcome: Outcome) -> Figure:
     """Draws motion and energies, whole and in detail, the table, and notes; FigureError where matplotlib is missing."""
-    figure = style.empty_figure(13.0, 7.8)
-    header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.085, 1.0))[:, 0]
+    words = _words(outcome)
+    below_in = _LINE_IN * len(words)
+    figure = style.empty_figure(13.0, 7.8 + below_in)
+    parts = figure.subfigures(3, 1, squeeze=False, height_ratios=(0.6, 7.2, below_in))[:, 0]
+    header, body, below = parts
     lines, close = outcome.trace.lines(), outcome.trace.close
     lines_of_table = 1 + min(len(rows(outcome)), _MOST)
     heights = (0.8, 1.6, max(0.14 * lines_of_table, 0.55))
@@ -56,8 +61,9 @@ def make_figure(outcome: Outcome) -> Figure:
             ax.axvspan(close[0, 0], close[0, -1], color=style.CLOSE, alpha=0.5, zorder=0.5, linewidth=0, gid="close")
         for ax in near:
             style.few_ticks(ax)
-    _table(body.add_subplot(grid[2, 0]), outcome, lines_of_table)
-    _words(body.add_subplot(grid[2, 1]), outcome)
+    _table(body.add_subplot(grid[2, :]), outcome, lines_of_table)
+    look = {"fontsize": style.SMALL, "color": style.GREY}
+    below.text(0.008, 1.0, "\n".join(words), va="top", gid="words", **look)
     _header(header, outcome)
     body.align_ylabels()
     return figure
@@ -151,13 +157,11 @@ def _table(ax: Axes, outcome: Outcome, lines: int) -> None:
             ax.text(x, y, cell, ha=align, va="center", fontsize=style.TEXT, color=style.INK, fontweight=weight)
 
 
-def _words(ax: Axes, outcome: Outcome) -> None:
-    ax.set_axis_off()
+def _words(outcome: Outcome) -> list[str]:
+    """Returns the lines of the notes, as wide as the figure."""
     more = len(outcome.elements) - _MOST
     notes = ([f"Left out here: {more} more element{'s' * (more > 1)}."] if more > 0 else []) + note_sentences(outcome)
-    wrapped = [line for sentence in notes for line in textwrap.wrap(sentence, 84)]
-    look = {"fontsize": style.SMALL, "color": style.GREY, "transform": ax.transAxes}
-    ax.text(0.0, 1.0, "\n".join(wrapped[:9]), va="top", gid="words", **look)
+    return [line for sentence in notes for line in textwrap.wrap(sentence, _LINE_LETTERS)]
 
 
 def _header(figure: SubFigure, outcome: Outcome) -> None:

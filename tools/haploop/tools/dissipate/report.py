@@ -29,9 +29,13 @@ _PASSIVITY: dict[Passivity, str] = {
     ),
 }
 _NAIVE = (
-    "That is the work of a force on the device, positive along the position, held to the next sample; a sensor's, "
-    "or one of a thinned-out recording, is not. The sum F v T would make it {naive}, off by {off}{share}."
+    "This is true of a force that is positive along the position and held to the next sample; that of a sensor, or of "
+    "a thinned-out recording, is not. What is taken out of the device counts as positive. The sum F v T, v that at the "
+    "sample (sampled books take the way after it), would say that the force {naive}: off by {off}{share}."
 )
+# An inertia above this, kg, is more often a mass in grams: the heaviest device that comes with haploop has 0.2 kg.
+_HEAVY_KG = 0.5
+_HEAVY = '{label}: a mass without a unit is in kg; is that what was meant? 1.8 g is --mass "1.8 g" or --mass 0.0018.'
 # Counts of the notes, and what each of them means.
 _COUNTS = {
     "gaps": "Gaps: {count}, {missing} in all; what happened there is not booked, and estimates begin anew after.",
@@ -108,6 +112,7 @@ def note_sentences(outcome: Outcome) -> list[str]:
         _truth(outcome),
         _SIZES if len(outcome.elements) > 1 else "",
         _IN_CONTACT if any(element.acts == "in-contact" for element in outcome.scene.dissipation) else "",
+        *(_HEAVY.format(label=each.label) for each in outcome.elements if _is_heavy(each)),
     ]
     if force and outcome.elements:
         said = _passivity(force)
@@ -121,15 +126,26 @@ def note_sentences(outcome: Outcome) -> list[str]:
     return [sentence for sentence in [*sentences, *notes.remarks] if sentence]
 
 
+def _is_heavy(element: ElementOutcome) -> bool:
+    mass = element.parameters.get("mass", 0.0)
+    return not isinstance(mass, str) and mass >= _HEAVY_KG
+
+
 def _passivity(force: ForceOutcome) -> str:
     words = _PASSIVITY[force.passivity].format(excess=amount(force.excess_J, "J"))
-    return f"the recorded force did {amount(-force.books.true_J, 'J')} of work on the device; {words}."
+    return f"in all the recorded force {_given_or_taken(force.books.true_J)}; {words}."
+
+
+def _given_or_taken(taken_J: float) -> str:
+    """Returns in words what has a sign in the table, where positive is taken out of the device."""
+    size = amount(abs(taken_J), "J")
+    return f"gave {size} to the device" if taken_J < 0.0 else f"took {size} out of the device"
 
 
 def _naive(force: ForceOutcome) -> str:
     true_J, off_J = force.books.true_J, abs(force.naive_J - force.books.true_J)
     share = f" ({100.0 * off_J / abs(true_J):.0f} % of it)" if true_J else ""
-    return _NAIVE.format(naive=amount(-force.naive_J, "J"), off=amount(off_J, "J"), share=share)
+    return _NAIVE.format(naive=_given_or_taken(force.naive_J), off=amount(off_J, "J"), share=share)
 
 
 def _estimates(scene: Scene, names: list[str]) -> str:

@@ -18,14 +18,20 @@ _TIMES = ("t", "time", "timestamp", "time_s", "t_s", "seconds")
 _POSITIONS = ("x", "position", "pos", "position_m", "x_m", "displacement")
 # Columns that may be a force, which is read only where it is asked for: its sign and its hold are not in the file.
 _FORCES = ("force", "force_n", "f_n", "f")
-# Times without a unit are seconds by these names; by others only if they are no whole numbers far apart.
+# Times without a unit are seconds by these names; by others only if they are not far apart.
 _IN_SECONDS = ("time_s", "t_s", "seconds")
 _FAR_APART_S = 0.1
+# Positions without a unit are metres by these names.
+_IN_METRES = ("position_m", "x_m")
 # Periods above which there is a gap between two samples, and below which a single one is missing; deviation above which
 # a period is uneven.
 _GAP, _ONE_MISSING, _UNEVEN = 1.5, 2.5, 0.1
 # Steps before and after a sample that repeats the one before, in counts: a device this fast does not stand still.
 _MOVING_COUNTS = 3.0
+# No quantity of a device is greater, in SI units.
+_MOST = 1e10
+# Positions without a unit that are further apart, m, are asked after, or said to be taken for metres.
+_FAR_M, _DOUBTFUL_M = 1.0, 0.1
 # Shortest and longest period that is accepted.
 _PERIODS_S = 1e-7, 1e3
 
@@ -77,6 +83,9 @@ class TextRecording:
         self.period_s = 1.0 / layout.rate_Hz if layout.rate_Hz else self._median_period(layout.time_unit)
         # The velocity needs one sample before, the acceleration two; what was recorded needs none.
         self._unknown = 2 - len(self.recorded)
+        place = self._columns["position"]
+        self._in_metres = bool(layout.length or place.unit) or place.name.strip().lower() in _IN_METRES
+        self._reach_m = (np.inf, -np.inf)
 
     def _choose(self, file: DelimitedFile, layout: Layout) -> tuple[dict[str, Column], dict[str, float]]:
         asked = {
@@ -130,10 +139,10 @@ class TextRecording:
             )
         column, times = self._columns["time"], block[0]["time"]
         has_unit = unit or column.unit or column.name.strip().lower() in _IN_SECONDS
-        if not has_unit and period_s >= _FAR_APART_S and (times == np.rint(times)).all():
+        if not has_unit and period_s >= _FAR_APART_S:
             raise RecordingError(
                 f"Are the times in column {column.name} of {self._file.path}, {times[0]:g}, {times[1]:g} and so on, "
-                "seconds or milliseconds? Give --time-unit s or --time-unit ms."
+                "seconds, milliseconds or microseconds? Give --time-unit s, ms or us."
             )
         if not _PERIODS_S[0] <= period_s <= _PERIODS_S[1]:
             raise RecordingError(
@@ -147,6 +156,7 @@ class TextRecording:
         for columns, lines in self._rows():
             columns, lines = self._bridged(columns, lines)
             t = columns["time"]
+            self._widen(columns["position"])
             steps = np.diff(t, prepend=t[:1] if last_s is None else last_s)
             self._refuse_disorder(t, steps, lines, last_s)
             is_gap = steps > _GAP * self.period_s
@@ -168,6 +178,21 @@ class TextRecording:
             last_s = float(t[-1])
         if self.notes.rows < 2:
             raise RecordingError(f"{self._file.path} holds fewer than two samples.")
+        low, high = self._reach_m
+        if not self._in_metres and high - low > _DOUBTFUL_M:
+            self.notes.remarks.append(
+                f"Column {self._columns['position'].name} has no unit and is taken for metres, {high - low:.3g} m peak "
+                "to peak; if it is not, give --unit, such as mm."
+            )
+
+    def _widen(self, x: Floats) -> None:
+        """Keeps lowest and highest position; RecordingError where they can hardly be metres and none are named."""
+        low, high = self._reach_m = min(self._reach_m[0], float(x.min())), max(self._reach_m[1], float(x.max()))
+        if not self._in_metres and high - low > _FAR_M:
+            raise RecordingError(
+                f"Are the positions in column {self._columns['position'].name} of {self._file.path}, from {low:.6g} "
+                f"to {high:.6g}, metres, millimetres or counts? Give --unit m, mm or metres a count, such as 30e-6."
+            )
 
     def _rows(self) -> Iterator[tuple[dict[str, Floats], Floats]]:
         """Yields SI columns by quantity, of all usable rows, and the rows' lines (time from the rate if given)."""
@@ -178,6 +203,7 @@ class TextRecording:
             if self._rate_Hz:
                 columns["time"] = np.arange(row, row + len(table)) / self._rate_Hz
             row += len(table)
+            self._refuse_huge(columns, lines)
             usable = np.isfinite(table).all(axis=1)
             self.notes.rows += int(usable.sum())
             self.notes.unusable_rows += int((~usable).sum())
@@ -193,6 +219,14 @@ class TextRecording:
             name: np.insert(column, at, column[at - 1] / 2.0 + column[at] / 2.0) for name, column in columns.items()
         }
         return whole, np.insert(lines, at, lines[at])
+
+    def _refuse_huge(self, columns: dict[str, Floats], lines: Floats) -> None:
+        for name, column in columns.items():
+            for at in np.flatnonzero((np.abs(column) > _MOST) & (name != "time")):
+                raise RecordingError(
+                    f"Line {lines[at]:.0f} of {self._file.path}: no {name} of a device is {column[at]:.3g} in SI "
+                    "units; give the unit that is meant."
+                )
 
     def _note_repeats(self, x: Floats) -> None:
         step = np.abs(np.diff(x))

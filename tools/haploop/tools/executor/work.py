@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 from haploop.controller.dissipation import Element
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene
+from haploop.protocol.transport.prints import unheard
 
 Sources = tuple[tuple[str, str], ...]
 Results = Callable[[list[Scene]], Iterator[tuple[int, Summary]]]
@@ -45,10 +47,11 @@ class Work:
             ImportError: JAX is asked for and not installed here.
         """
         began = time.perf_counter()
-        results = self._results()
-        scenes, kept = self._made(items)
-        for index, result in _safely(results, scenes, list(scenes)):
-            kept[index] = self.keep(items[index], scenes[index], result)
+        with unheard() if self.sources else nullcontext():
+            results = self._results()
+            scenes, kept = self._made(items)
+            for index, result in _safely(results, scenes, list(scenes)):
+                kept[index] = self.keep(items[index], scenes[index], result)
         return time.perf_counter() - began, [kept[index] for index in range(len(items))]
 
     def lost(self, item: Any, why: str) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -9,9 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from haploop.launch.runs.run_files import recorded_log, recorded_scene, recorded_summary
+from haploop.launch.spec import PLUGINS
 from haploop.logger.summary import Summary
 from haploop.protocol.changes import Event, Span, changes_of, spans
 from haploop.protocol.scene.scene import ElementTable, Scene, Wall
+from haploop.tools.figure.scene_units import declared_units, element_units
 
 Floats = np.ndarray
 # What the close view shows of the last contact at most, and the loops of the beginning.
@@ -111,6 +114,7 @@ class RunData:
         bodies_m, plant_forces_N: positions of the bodies beyond x, and forces of the plant's own effects, by name, at
             the same times.
         cut: where the log ends if it was cut off, else "".
+        units: of the parameters of elements, by kind and name (``damping.damping``).
     """
 
     scene: Scene
@@ -127,6 +131,7 @@ class RunData:
     plant_forces_N: dict[str, Floats]
     every_step: bool
     cut: str
+    units: Mapping[str, str]
 
     @classmethod
     def from_directory(cls, directory: Path) -> RunData:
@@ -150,6 +155,7 @@ class RunData:
         if plant and scene.actuator:
             forces.setdefault("actuator", plant["force"])
         events = log.get("/events", [])
+        plugins = [data.decode(errors="replace") for name, data in log.attachments.items() if name.startswith(PLUGINS)]
         return cls(
             scene=scene,
             summary=recorded_summary(directory) or {},
@@ -165,6 +171,7 @@ class RunData:
             plant_forces_N=forces,
             every_step=plant is not None,
             cut=log.cut,
+            units=element_units() | declared_units("\n".join(plugins)),
         )
 
     @property

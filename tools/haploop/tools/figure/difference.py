@@ -11,7 +11,7 @@ import numpy as np
 
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Tables
-from haploop.tools.figure.data import RunData
+from haploop.tools.figure.data import TOGETHER, RunData
 from haploop.tools.render.report import plant_books
 from haploop.tools.render.terminal import told
 
@@ -32,6 +32,7 @@ class Difference:
     """Two runs beside each other.
 
     Attributes:
+        runs: their directories, the part that tells them apart; names: their titles.
         scene: dotted key -> both values, where they are not the same; None where one scene has no such key.
         results: what came of each run, by words: verdict, end, hash.
         energies_J: by the name of the book, in J; None where one has no such book.
@@ -39,6 +40,7 @@ class Difference:
         parting: where they part; None where all of these ticks are the same, or are not to be compared (``why_not``).
     """
 
+    runs: tuple[str, str]
     names: tuple[str, str]
     scene: Mapping[str, Pair]
     results: Mapping[str, Pair]
@@ -48,12 +50,13 @@ class Difference:
     why_not: str = field(default="")
 
 
-def difference(a: RunData, b: RunData) -> Difference:
-    """Returns what two runs differ in; the one of a run that was killed goes as far as its log does."""
+def difference(a: RunData, b: RunData, *, runs: tuple[str, str] = ("first", "second")) -> Difference:
+    """Returns what two runs, called ``runs``, differ in; of one that was killed, as far as its log goes."""
     ticks, parting, why_not = _parting(a, b)
     results = [_results(run) for run in (a, b)]
     energies = [_energies_J(run) for run in (a, b)]
     return Difference(
+        runs=runs,
         names=(a.scene.title, b.scene.title),
         scene=unlike_keys([a.scene, b.scene]),
         results={name: (results[0].get(name), results[1].get(name)) for name in results[0] | results[1]},
@@ -100,6 +103,9 @@ def _results(run: RunData) -> dict[str, Any]:
         "ended": summary["ended"],
         "logged_s": run.span_s[1],
         "oscillation_m": summary["window"]["oscillation_m"],
+        "force_swing_N": summary["window"].get("force_swing_N"),
+        "force_ripple_N": summary["window"].get("force_ripple_N"),
+        "width_m": found.get("width_m"),
         "frequency_Hz": found.get("frequency_Hz") or None,
         "trajectory_sha256": summary.get("trajectory_sha256"),
     }
@@ -110,6 +116,8 @@ def _energies_J(run: RunData) -> dict[str, float | None]:
         return {}
     energy = run.summary.get("energy", {})
     books = {book.name: book.ends_J[0] for book in run.books()}
+    if books:  # what has one book alone has all in it
+        books[TOGETHER] = [*books.values()][-1]
     return books | {words: energy[key] for key, words in plant_books(energy).items()}
 
 
@@ -135,4 +143,5 @@ def _parting(a: RunData, b: RunData) -> tuple[int, Parting | None, str]:
 
 def difference_of(first: Path, second: Path) -> Difference:
     """Returns what the runs of two directories differ in; raises what ``RunData.from_directory`` does."""
-    return difference(RunData.from_directory(first), RunData.from_directory(second))
+    unlike = (first.name, second.name) if first.name != second.name else (str(first), str(second))
+    return difference(RunData.from_directory(first), RunData.from_directory(second), runs=unlike)

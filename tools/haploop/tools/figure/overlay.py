@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from haploop.tools.figure.run_figure import key_numbers
 from haploop.tools.figure.scene_units import unit_at
 from haploop.tools.figure.time import MM, line
 from haploop.tools.render.terminal import told
-from haploop.tools.render.units import amount, prefix_for
+from haploop.tools.render.units import amount, parameters, prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,7 +51,9 @@ def draw_overlay(directories: Sequence[Path], target: Path | None = None) -> Pat
 def make_overlay(runs: Sequence[RunData]) -> Figure:
     """Makes the figure of several runs; FigureError where matplotlib is missing."""
     figure = style.empty_figure(15.0, 9.0 + 0.25 * len(runs))
-    header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.02 + 0.025 * len(runs), 1.0))[:, 0]
+    told = labels(runs)
+    rows = len(runs) + (is_titled := told[0] != runs[0].scene.title and not told[0].startswith(runs[0].scene.title))
+    header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.02 + 0.025 * rows, 1.0))[:, 0]
     span_s = min(run.span_s[0] for run in runs), max(run.span_s[1] for run in runs)
     close_s = max(run.close_s() for run in runs)  # the one that begins last
     grid = body.add_gridspec(3, 2, width_ratios=(1.9, 1.25))
@@ -60,26 +62,47 @@ def make_overlay(runs: Sequence[RunData]) -> Figure:
         _forces(body.add_subplot(grid[1, column]), runs, seen_s, f"Force of the controller{more}")
     _energies(body.add_subplot(grid[2, :]), runs, span_s)
     body.align_ylabels()
-    for place, (label, run) in enumerate(zip(labels(runs), runs, strict=True)):
-        y = 1.0 - (place + 0.5) / len(runs)
+    if is_titled:
+        y, look = 1.0 - 0.5 / rows, {"va": "center", "fontsize": style.TEXT + 1, "color": style.INK}
+        title = header.text(0.008, y, runs[0].scene.title, fontweight="bold", gid="title", **look)
+        style.fit_text(title, header.bbox.width * 0.98)
+    for place, (label, run) in enumerate(zip(told, runs, strict=True)):
+        y = 1.0 - (place + is_titled + 0.5) / rows
         _head(header, run, label, y, _COLOURS[place])
     return figure
 
 
 def labels(runs: Sequence[RunData]) -> list[str]:
-    """Returns for each run its name and what of its scene is not the same in all."""
+    """Returns for each run its name, where not all have the same, and what of its scene differs."""
     unlike = unlike_keys([run.scene for run in runs])
+    titles = [run.scene.title for run in runs]
     if not unlike:
-        return [run.scene.title for run in runs]
-    found = []
-    for place, run in enumerate(runs):
-        own = {key: values[place] for key, values in unlike.items() if values[place] is not None}
-        words = [f"{key} {scene_value(value)} {unit_at(run.scene, key)}".rstrip() for key, value in own.items()]
-        # Where it has none of the keys, those of the others.
-        words = words or [f"no {key}" for key in unlike]
-        more = f" and {len(words) - _MOST_KEYS} more" if len(words) > _MOST_KEYS else ""
-        found.append(f"{run.scene.title} ({', '.join(words[:_MOST_KEYS])}{more})")
-    return found
+        return titles
+    differ = [_differs(run, place, runs, unlike) for place, run in enumerate(runs)]
+    if len({*titles}) == 1 and all(differ):
+        return differ
+    return [f"{title} ({words})" if words else title for title, words in zip(titles, differ, strict=True)]
+
+
+def _differs(run: RunData, place: int, runs: Sequence[RunData], unlike: Mapping[str, Sequence[Any]]) -> str:
+    """Returns what of a run's scene is not the same in all: elements in words, of which some have none, then keys."""
+    words, told = [], set[str]()
+    for slot in range(max(len(one.scene.dissipation) for one in runs)):
+        there = [one.scene.dissipation[slot] if slot < len(one.scene.dissipation) else None for one in runs]
+        if len({element and element.name for element in there}) > 1:
+            told.add(f"dissipation.{slot}.")
+            if (own := there[place]) is not None:
+                numbers = parameters(own.as_dict(), run.units)
+                words.append(f"with {own.name}" + (f" ({numbers})" if numbers else ""))
+            else:
+                words.append(f"without {' or '.join(dict.fromkeys(one.name for one in there if one))}")
+    for key, values in unlike.items():
+        if values[place] is not None and not key.startswith(tuple(told)):
+            words.append(f"{key} {scene_value(values[place])} {unit_at(run.scene, key, run.units)}".rstrip())
+    # Where it has none of the keys, those of the others.
+    words = words or [f"no {key}" for key in unlike]
+    more = f" and {len(words) - _MOST_KEYS} more" if len(words) > _MOST_KEYS else ""
+    return ", ".join(words[:_MOST_KEYS]) + more
 
 
 def _head(header: Figure | SubFigure, run: RunData, label: str, y: float, colour: str) -> None:

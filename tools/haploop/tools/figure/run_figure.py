@@ -10,7 +10,6 @@ from haploop.tools.figure import style
 from haploop.tools.figure.data import TOGETHER, Book, RunData
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
 from haploop.tools.figure.own_columns import draw_own_columns, own_columns
-from haploop.tools.figure.scene_units import element_units
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
 from haploop.tools.render.report import HELD, count_losses, leak_rows, plant_books, swing_words
 from haploop.tools.render.terminal import told
@@ -96,13 +95,14 @@ def key_numbers(run: RunData) -> list[str]:
         return [f"{'log cut off' if run.cut else 'no summary'}: {last - first:g} s of {run.scene.duration:g} s"]
     window, energy = run.summary["window"], run.summary["energy"]
     words = [f"in the last {last - window['from_s']:.3g} s: oscillation {amount(window['oscillation_m'], 'm')}"]
-    if (ripple_N := window.get("force_ripple_N")) is not None:
-        words[0] += f", force ripple {amount(ripple_N, 'N')}"
+    if (swing_N := window.get("force_swing_N")) is not None:
+        words[0] += f", force {amount(swing_N, 'N')} peak to peak"
     if (found := run.summary.get("stability", {})).get("rate_1_s") is not None:
         words.append(f"pushed, it swings {swing_words(found)}")
-    if run.history.walls and run.summary["verdict"] != "no-contact":
+    wall = run.wall_table_at(float(run.ticks_s[-1]))
+    if wall and run.summary["verdict"] != "no-contact":
         words.append(f"outside the wall {100 * window['outside_fraction']:.0f} %")
-        displayed, wall = window["displayed_stiffness_N_m"], run.history.walls[-1].wall
+        displayed = window["displayed_stiffness_N_m"]
         wanted = f" of {spring(wall.stiffness)}" if wall.kind in (None, "spring") else ""
         words += [f"displayed stiffness {spring(displayed)}{wanted}"] if displayed is not None else []
     left = f"residual {amount(energy['residual_J'], 'J')} of " if "unmodelled_work_J" not in energy else ""
@@ -147,7 +147,7 @@ def book_rows(run: RunData, books: list[Book]) -> list[Row]:
     for book in [*shown[:_MOST_BOOKS], *together]:
         name, at_work = book.name, ""
         if span := spans.get(book.name):
-            name = f"{book.name} ({parameters(span.element.as_dict(), element_units())})"
+            name = f"{book.name} ({parameters(span.element.as_dict(), run.units)})"
             end_s = min(span.to_tick / run.control_rate, run.span_s[1])
             at_work = f"{span.from_tick / run.control_rate:g}–{end_s:g}"
         true, sampled = (amount(value, "J") for value in book.ends_J)
@@ -166,7 +166,7 @@ def event_lines(run: RunData) -> list[str]:
     """Returns the numbered events as lines that fit below the figure."""
     lines = [""]
     for number, event in enumerate(run.events, start=1):
-        words = f"{number} at {event['timestamp']:g} s: {describe(event, element_units())}"
+        words = f"{number} at {event['timestamp']:g} s: {describe(event, run.units)}"
         if lines[-1] and len(lines[-1]) + len(words) + 5 > _LINE_LETTERS:
             if len(lines) == _MOST_LINES:
                 lines[-1] += f"     and {len(run.events) - number + 1} more"

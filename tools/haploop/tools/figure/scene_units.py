@@ -1,7 +1,10 @@
-"""Units of the numbers of a scene, by dotted key, and of the parameters of installed elements."""
+"""Units of the numbers of a scene, by dotted key, and of the parameters of elements, installed or of plugin files."""
 
 from __future__ import annotations
 
+import ast
+from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from typing import get_type_hints
 
@@ -22,11 +25,29 @@ def element_units() -> dict[str, str]:
     return {f"{kind}.{name}": of.unit for kind, it in kinds.items() for name, (of, _) in it.parameters().items()}
 
 
-def unit_at(scene: Scene, key: str) -> str:
-    """Returns the unit of the number at a dotted key; "" where it has none, or a plugin file alone knows it."""
+def declared_units(source: str) -> dict[str, str]:
+    """Returns the units that the text of a plugin file declares, as ``element_units``; it is read, never run."""
+    units: dict[str, str] = {}
+    with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
+        for made in [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef)]:
+            kinds = [
+                line.value
+                for line in made.body
+                if isinstance(line, ast.Assign) and ast.unparse(line.targets[0]) == "kind"
+            ]
+            for line in [line for line in made.body if isinstance(line, ast.AnnAssign)]:
+                calls = [node for node in ast.walk(line.annotation) if isinstance(node, ast.Call)]
+                match kinds, calls:
+                    case [ast.Constant(str(kind))], [ast.Call(args=[ast.Constant(str(unit)), *_])]:
+                        units[f"{kind}.{ast.unparse(line.target)}"] = unit
+    return units
+
+
+def unit_at(scene: Scene, key: str, units: Mapping[str, str]) -> str:
+    """Returns the unit of the number at a dotted key, "" for none; ``units`` has those of elements."""
     around, _, name = key.rpartition(".")
     inside = value_at(scene, around) if around else scene
     if isinstance(inside, ElementTable):
-        return element_units().get(f"{inside.name}.{name}", "")
+        return units.get(f"{inside.name}.{name}", "")
     hint = get_type_hints(type(inside), include_extras=True).get(name) if isinstance(inside, Table) else None
     return next((part.unit for part in getattr(hint, "__metadata__", ()) if isinstance(part, Quantity)), "")

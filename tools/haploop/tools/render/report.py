@@ -90,7 +90,9 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
         ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak at its end"),
     ]
     if (ripple_N := window.get("force_ripple_N")) is not None:
-        figures.append(("force ripple > 30 Hz", f"{amount(ripple_N, 'N')} peak to peak at its end"))
+        whole = window.get("force_swing_N")
+        both = f"{amount(whole, 'N')} at its end; " if whole is not None else ""
+        figures.append(("force, peak to peak", f"{both}{amount(ripple_N, 'N')} of it above 30 Hz"))
     found = summary.get("stability", {})
     figures += _stability(found)
     if summary["verdict"] == "steady" and "push_N" in found:
@@ -181,7 +183,7 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     if not rests(found):
         watched = f"watched for {found['watched_s']:g} s"
         rows += [
-            ("its force > 30 Hz", f"{amount(found['force_ripple_N'], 'N')} peak to peak"),
+            ("its force above 30 Hz", f"{amount(found['force_ripple_N'], 'N')} peak to peak"),
             ("growth", f"{found['rate_1_s']:.3g} +- {found['error_1_s']:.2g} 1/s, {watched}"),
         ]
     if (share := found.get("own_share")) is not None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from haploop.launch.batch.jax.block import Rings
 from haploop.logger.verdict.measures import ROUNDING, MeasuredColumns, RunMeasures, window_measures, window_span
-from haploop.logger.verdict.ripple import ripple
+from haploop.logger.verdict.ripple import peak_to_peak, ripple
 from haploop.logger.verdict.window import Window, keep_steps, last_rows
 
 
@@ -44,8 +44,8 @@ class CompiledWindow(Window):
         stiffness, depth = _where_any(*means[:2]), _where_any(*means[2:])
         # Gone through once a run: a transform by NumPy costs less than a program for it.
         command = last_rows(np.asarray(self.rings.rows["total"]), steps // n, wanted)[:, -span.ticks :]
-        ripples = ripple(command, self._time.control_rate).tolist()
-        measured = MeasuredColumns(crossings, growth, width, inside, stiffness, depth, ripples)
+        forces = ripple(command, self._time.control_rate).tolist(), peak_to_peak(command).tolist()
+        measured = MeasuredColumns(crossings, growth, width, inside, stiffness, depth, *forces)
         yield from map(
             RunMeasures, window_measures(measured, span, rate), self.extremes(wanted), self.swing_m[wanted].tolist()
         )
@@ -66,7 +66,7 @@ class _Swings(NamedTuple):
 
 @partial(jax.jit, static_argnames=("steps", "ticks"))
 def _look(x: Any, rows: dict[str, jax.Array], ran: Any, swing_m: Any, *, steps: int, ticks: int) -> list[Any]:
-    """Returns the columns of ``MeasuredColumns`` but the ripple, the counts before each mean; see ``measure_window``.
+    """Returns the columns of ``MeasuredColumns`` but the last two, the counts before each mean; see ``measure_window``.
 
     Args:
         x: positions, shape (ticks kept, n, members); rows: ``CONTROLLER_COLUMNS``, shape (ticks kept, members).

@@ -61,6 +61,8 @@ def parse(
 
 def _hint(problem: str, text: str) -> str:
     """Returns how to write a value that TOML has no form for: a decimal comma, or a unit without quotes."""
+    if re.search(r"Illegal character '\\n'|Unterminated string|Expected \"'", problem):
+        return " A quotation mark is not closed."
     line = re.search(r"at line (\d+)", problem)
     written = text.splitlines()[int(line[1]) - 1] if line else ""
     value = written.partition("=")[2].partition("#")[0].strip()

@@ -17,13 +17,22 @@ export function fixed(value, digits = 3) {
   return minus(value.toFixed(Math.min(20, Math.max(0, digits - beforePoint))));
 }
 
+const prefixOf = (size) => (size === 0 ? [1, ""] : PREFIXES.find(([f]) => size >= f * 0.9995) ?? PREFIXES.at(-1));
+
 /** A number with its unit: "5.14 mm"; a dash for no number, powers of ten where no prefix helps. */
 export function amount(value, unit, digits = 3) {
   if (!isNumber(value)) return NONE;
   const size = Math.abs(value);
-  const [factor, letter] = size === 0 ? [1, ""] : PREFIXES.find(([f]) => size >= f * 0.9995) ?? PREFIXES.at(-1);
+  const [factor, letter] = prefixOf(size);
   if (size && !(size / factor >= 1e-3 && size / factor < 1e5)) return `${power(value, digits)} ${unit}`;
   return `${fixed(value / factor, digits)} ${letter}${unit}`;
+}
+
+/** What is there of a whole, both in the whole's unit and to its digits: "0.52 of 1.00 MN/m". */
+export function amountOf(part, whole, unit) {
+  const [factor, letter] = prefixOf(whole);
+  const text = fixed(whole / factor);
+  return `${steady(part / factor, (text.split(".")[1] ?? "").length)} of ${text} ${letter}${unit}`;
 }
 
 /** A number in powers of ten: "2.1e−16". */

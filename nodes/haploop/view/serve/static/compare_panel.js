@@ -11,7 +11,7 @@ const FIGURES = [
   ["seen", ({ word }) => word],
   ["swing", ({ oscillation_m: width }) => amount(width, "m")],
   ["at", ({ frequency_Hz: hz }) => amount(hz, "Hz")],
-  ["force ripple", ({ ripple_N: ripple }) => amount(ripple, "N")],
+  ["force, peak to peak", ({ force_swing_N: swing }) => amount(swing, "N")],
   ["displayed stiffness", ({ stiffness_N_m: k }) => amount(k, "N/m")],
 ];
 

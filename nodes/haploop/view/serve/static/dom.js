@@ -22,19 +22,22 @@ export function sign(element, shape, word) {
   put(element.querySelector("span"), word);
 }
 
+// What is due waits so long for the next picture, to be part of it: a picture of its own costs the browser as much again.
+const NEXT_PICTURE_MS = 50;
+
 /** What texts need to be read: `act`, at most once in so many ms, the last time with the last arguments. */
 export function seldom(act, gap_ms = 120) {
   let [due, timer, last] = [0, 0, []];
   const run = () => {
+    clearTimeout(timer);
     [due, timer] = [performance.now() + gap_ms, 0];
     act(...last);
   };
   return (...now) => {
     last = now;
-    if (timer) return;
     const wait_ms = due - performance.now();
-    if (wait_ms > 0) timer = setTimeout(run, wait_ms);
-    else run();
+    if (wait_ms <= 0) run();
+    else timer ||= setTimeout(run, wait_ms + NEXT_PICTURE_MS);
   };
 }
 

@@ -1,6 +1,6 @@
 // The answer at once: the verdict, the state of the run and the numbers that tell how it goes.
 
-import { amount, fixed, isNumber, NONE, power, steady } from "./amounts.js";
+import { amount, amountOf, fixed, isNumber, NONE, plain, power, steady } from "./amounts.js";
 import { byId, put, sign } from "./dom.js";
 
 const WORDS = { lost: "not connected" };
@@ -32,7 +32,7 @@ export function showHeader(state, phase) {
   const { sight } = state;
   put(byId("oscillation"), amount(sight?.oscillation_m, "m"));
   put(byId("frequency"), amount(sight?.frequency_Hz, "Hz"));
-  put(byId("ripple"), amount(sight?.ripple_N, "N"));
+  put(byId("ripple"), amount(sight?.force_swing_N, "N"));
   put(byId("stiffness"), stiffness(state));
   put(byId("residual"), share(state));
   byId("residual").title = state.balance ?? "";
@@ -54,8 +54,8 @@ function showVerdict(state) {
   sign(sought, `verdict-${known}`, told(state) || "no verdict");
 }
 
-/** What is seen still where a loop is judged steady: a swing that dies away is steady, and in the picture. */
-const moved = ({ verdict, sight }) => (verdict === "steady" && (sight?.word in SIGNS || sight?.word === "dying away") ? `last seen: ${sight.word}` : "");
+/** What is seen still where a loop is judged steady, or not to be judged: a swing that dies away is in the picture. */
+const moved = ({ verdict, sight }) => (["steady", "undecided"].includes(verdict) && (sight?.word in SIGNS || sight?.word === "dying away") ? `last seen: ${sight.word}` : "");
 
 /** Of when a word is: of how much of the half second that it takes, or of which. */
 function seen(sight) {
@@ -64,12 +64,9 @@ function seen(sight) {
   return soFar ? `so far: ${steady(to - from, 2)} of 0.5 s` : `in ${steady(from, 2)}–${steady(to, 2)} s`;
 }
 
-/** A number of at most six digits, in powers of ten beyond. */
-const short = (value) => (Math.abs(value) < 1e5 ? fixed(value) : power(value, 3));
-
 function stiffness({ displayed_stiffness_N_m: displayed, wall }) {
-  if (!isNumber(displayed)) return NONE;
-  return wall?.into_wall && !wall.kind ? `${short(displayed)} of ${short(wall.stiffness)} N/m` : `${short(displayed)} N/m`;
+  const isSpring = isNumber(displayed) && wall?.into_wall && !wall.kind;
+  return isSpring ? amountOf(displayed, wall.stiffness, "N/m") : amount(displayed, "N/m");
 }
 
 function share({ residual_J: residual, moved_J: moved }) {
@@ -80,7 +77,7 @@ function factor({ real_time_factor: now, pace, summary, lateness: late }) {
   if (late?.clock === "plant" && late.ticks) return `${fixed((100 * late.late_ticks) / late.ticks, 2)} % late`;
   const real = summary?.real_time_factor ?? now;
   if (!isNumber(real)) return NONE;
-  return `${fixed(real)}×${isNumber(pace) && pace !== 1 ? ` of ${fixed(pace, 2)}×` : ""}`;
+  return isNumber(pace) && pace !== 1 && !summary ? `${Math.round((100 * real) / pace)} % of ${plain(pace)}×` : `${fixed(real)}×`;
 }
 
 function lateness({ lateness: late }) {

@@ -27,6 +27,7 @@ let connected = false;
 let marks = [];
 let newest = null;
 let snapshot = null;
+let arrived = 0;
 let drawn = 0;
 
 const phase = () => (connected ? state.phase : "lost");
@@ -110,13 +111,15 @@ function onEvents(events) {
 function onSnapshot(buffer) {
   if (!newest) requestAnimationFrame(draw);
   newest = buffer;
+  arrived += 1;
 }
 
 function draw() {
   snapshot = decode(newest);
+  stream.send({ type: "drawn", snapshots: arrived }); // the next one is made meanwhile
   newest = null;
+  arrived = 0;
   drawn += 1;
-  stream.send({ type: "drawn" }); // the next one is made meanwhile
   redraw();
 }
 

@@ -73,9 +73,9 @@ export function strips(u, xs, ys) {
 /** Draw strips as wide as a line, and dashed; where they cover the same heights again and again, faintly within edges. */
 export function drawStrips(u, found, { width, dash = [] }) {
   const { left, top, width: wide, height: tall } = u.bbox;
-  const pen = width * devicePixelRatio;
+  const pen = Math.max(1, Math.round(width * devicePixelRatio));
   const pattern = dash.flatMap((length, i) => Array(length).fill(i % 2 === 0));
-  const isGap = (x) => pattern[Math.floor((x - left) / devicePixelRatio) % pattern.length] === false;
+  const isGap = (x) => dash.length && pattern[Math.floor((x - left) / devicePixelRatio) % pattern.length] === false;
   let [low, high, sum] = [Infinity, -Infinity, 0];
   for (let i = 0; i < found.length; i += 4) {
     if (found[i + 2] < low) low = found[i + 2];
@@ -87,18 +87,31 @@ export function drawStrips(u, found, { width, dash = [] }) {
   u.ctx.beginPath();
   u.ctx.rect(left, top, wide, tall);
   u.ctx.clip();
-  for (const part of isFaint ? ["within", "edges"] : ["whole"]) {
+  for (const part of isFaint ? ["within", "top", "bottom"] : ["whole"]) {
+    // Neighbours of the same height, in whole pixels, are one rectangle.
+    let [begin, end, from, to, alpha] = [0, 0, 0, 0, 0];
+    const fill = () => {
+      u.ctx.globalAlpha = alpha;
+      if (to > from) u.ctx.fillRect(begin, from, end - begin, to - from);
+    };
     for (let i = 0; i < found.length; i += 4) {
-      const [x, across, from, to] = [found[i], found[i + 1], found[i + 2] - pen / 2, found[i + 3] + pen / 2];
-      const isThick = to - from > THICK * pen;
+      const x = found[i];
+      let y0 = Math.round(found[i + 2] - pen / 2);
+      let y1 = Math.max(y0 + pen, Math.round(found[i + 3] + pen / 2));
+      const isThick = y1 - y0 > THICK * pen;
       const isBetween = part !== "within" && isGap(x);
-      if (isBetween && !isThick) continue; // a peak is not left out between two dashes
-      u.ctx.globalAlpha = isBetween || part === "within" ? FAINT : 1;
-      if (part === "edges" && isThick) {
-        u.ctx.fillRect(x, from, across, pen);
-        u.ctx.fillRect(x, to - pen, across, pen);
-      } else if ((part !== "within") !== (isFaint && isThick)) u.ctx.fillRect(x, from, across, to - from);
+      if (isBetween && !isThick) y1 = y0; // a peak is not left out between two dashes
+      else if (part === (isThick ? "top" : "")) y1 = y0 + pen;
+      else if (part === "bottom") y0 = isThick ? y1 - pen : y1;
+      else if (part === "within" && !isThick) y1 = y0;
+      const strength = isBetween || part === "within" ? FAINT : 1;
+      if (x !== end || y0 !== from || y1 !== to || strength !== alpha) {
+        fill();
+        [begin, from, to, alpha] = [x, y0, y1, strength];
+      }
+      end = x + found[i + 1];
     }
+    fill();
   }
   u.ctx.restore();
 }

@@ -18,7 +18,7 @@ export const obstacle = (phase) => REASONS[phase] ?? (maySteer() ? "" : WATCHING
 export function allow(phase, why) {
   const reason = obstacle(phase);
   for (const fieldset of document.querySelectorAll("fieldset[data-steers]")) fieldset.disabled = reason !== "";
-  put(byId("notice"), [reason, why && why[0].toUpperCase() + why.slice(1)].filter(Boolean).join(" "));
+  put(byId("notice"), [reason, why && why[0].toUpperCase() + why.slice(1).replace(/[^.]$/, "$&.")].filter(Boolean).join(" "));
 }
 
 export class Steering {

@@ -16,7 +16,7 @@ export function showSummary(state) {
   if (!summary || panel.dataset.known === known) return;
   panel.dataset.known = known;
   panel.replaceChildren(
-    make("h2", { id: "summary-title" }, `${summary.ended === "failed" ? "Failed; last seen" : "Ended"}: ${told(state) ?? NONE}`),
+    make("h2", { id: "summary-title" }, `${summary.ended === "failed" ? "Failed" : "Ended"}: ${told(state) ?? NONE}`),
     make("p", { class: "about" }, (isJudged(state) ? summary.verdict_rule : state.sight?.why) ?? ""),
     make("p", { class: "balance" }, summary.energy?.balance ?? ""),
     rows({ ...pushed(summary.stability ?? {}), ...figures(summary), ...foreign(summary.programs) }),
@@ -33,7 +33,7 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
     "pushed, it swings":
       found.width_m < 1e-9 ? "less than 1 nm" : `${amount(found.width_m, "m")} ± ${amount(found.spread_m, "m", 2)}`,
     "that is": [...how, found.chaotic && "chaotic"].filter(Boolean).join(", "),
-    "its force > 30 Hz": amount(found.force_ripple_N, "N"),
+    "its force above 30 Hz": amount(found.force_ripple_N, "N"),
     growth: `${fixed(rate)} ± ${fixed(error, 2)} 1/s`,
     ...(found.blown ? { [`after a blow of ${amount(found.blow_N, "N")}`]: found.blown } : {}),
     "its own in the run's swing": share(found.own_share),

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.advise.walls.cases import Case
-from haploop.tools.advise.walls.trial import Failure, Job, Trial, Tried
+from haploop.tools.advise.walls.store import Failure, Job, Tried
+from haploop.tools.advise.walls.trial import Trial
 
 # No wall softer than the first is a wall; no device renders one stiffer than the second.
 LEAST_N_M, MOST_N_M = 1.0, 1e6

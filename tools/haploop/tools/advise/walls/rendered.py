@@ -13,7 +13,8 @@ from haploop.tools.advise.walls.cases import LASTS_S, slowness
 from haploop.tools.advise.walls.felt import ripple
 from haploop.tools.advise.walls.limit import Query, limits
 from haploop.tools.advise.walls.loops import Seen, make_loops
-from haploop.tools.advise.walls.trial import FROM_S, STRETCH_S, Failure, Trial
+from haploop.tools.advise.walls.store import Failure
+from haploop.tools.advise.walls.trial import FROM_S, STRETCH_S, Trial
 from haploop.tools.linear.linearity import installed_kinds
 
 # A wall of which less than this share is rendered is hidden by its element: softer ones are measured, too.

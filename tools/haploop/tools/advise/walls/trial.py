@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
-import hashlib
-import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from importlib.metadata import version
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
 
 from haploop.controller.dissipation import ElementError
-from haploop.launch.spec import OutputError
-from haploop.protocol.scene.scene import ElementTable, Scene, Wall
+from haploop.protocol.scene.scene import Scene, Wall
 from haploop.tools.advise.walls.cases import LASTS_S, Case, slowness
 from haploop.tools.advise.walls.felt import Buzz, Threshold, buzz, felt_force_N
 from haploop.tools.advise.walls.loops import LoneLoop, Loops, is_plain, make_loops
+from haploop.tools.advise.walls.store import Failure, Job, Store, Tried
 from haploop.tools.executor.executors import Executor, InlineExecutor, make_executor, map_parallel
 from haploop.tools.linear.linearity import installed_kinds
 
@@ -32,92 +27,6 @@ _DYING, _LONGER = 0.8, 4
 _NO_CONTACT = "cannot be told: in no case is the device still at the wall after {0:g} s"
 # Members that are worth a worker of their own.
 _PART = 150
-
-
-@dataclass(frozen=True)
-class Tried:
-    """A wall to be tried: its stiffness and the elements with it."""
-
-    stiffness_N_m: float
-    elements: tuple[ElementTable, ...] = ()
-
-
-@dataclass(frozen=True)
-class Failure:
-    """What a wall does in the case that it does not bear.
-
-    Attributes:
-        case: in words; or why it cannot be told, with a frequency of 0.
-        at_s: end of the stretch in which it was seen.
-        gone: whether the device left its limits; the numbers are of no meaning then.
-        motion_m, force_N, frequency_Hz, times_felt, by_force: of that stretch, as of ``Buzz``.
-    """
-
-    case: str
-    at_s: float
-    gone: bool
-    motion_m: float = 0.0
-    force_N: float = 0.0
-    frequency_Hz: float = 0.0
-    times_felt: float = 0.0
-    by_force: bool = False
-
-
-class Store:
-    """Failures of walls, or None, by a key that has everything in it that decides: a changed scene finds nothing.
-
-    A line each in a file, so that an interrupted advice goes on; several may add to one file. What is no such line, as
-    after a kill or on a full disk, is passed over, and its wall tried again.
-
-    Args:
-        file: JSON lines, read and added to; None keeps nothing.
-
-    Raises:
-        OutputError: the file cannot be read, or added to.
-    """
-
-    def __init__(self, file: Path | None = None) -> None:
-        self._file, self._version = file, version("haploop")
-        self.known: dict[str, Failure | None] = {}
-        with self._writable():
-            text = file.read_text(encoding="utf-8", errors="replace") if file and file.exists() else ""
-        for line in text.split("\n"):
-            with contextlib.suppress(ValueError, TypeError):
-                key, failure = json.loads(line)
-                self.known[str(key)] = None if failure is None else Failure(**failure)
-
-    def key(self, loop: Scene, wall: Tried, cases: Sequence[Case]) -> str:
-        """Returns the key of a trial: loop, wall, cases and the version of haploop."""
-        told = repr((self._version, loop, wall, tuple(cases)))
-        return hashlib.sha256(told.encode()).hexdigest()[:24]
-
-    def add(self, results: Mapping[str, Failure | None]) -> None:
-        """Keeps results by their keys, on disk at once, whole lines after whatever is there."""
-        self.known |= results
-        lines = (json.dumps([key, asdict(failure) if failure else None]) for key, failure in results.items())
-        with self._writable():
-            if self._file:
-                with self._file.open("ab") as file:
-                    file.write("\n".join(["", *lines, ""]).encode())
-
-    @contextlib.contextmanager
-    def _writable(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise OutputError(
-                f"{self._file}, where what was tried is kept, cannot be used: {error.strerror}. Make room or give "
-                "another directory with --out; with the same one, what is in it already is not tried again."
-            ) from error
-
-
-@dataclass(frozen=True)
-class Job:
-    """Walls that are tried on one loop, all in the same cases."""
-
-    loop: Scene
-    walls: tuple[Tried, ...]
-    cases: tuple[Case, ...]
 
 
 class Trial:
@@ -161,7 +70,7 @@ class Trial:
         executor: Executor = self._there if len(parts) > 1 else self._here
         work = [[new[key] for key in part] for part in parts]
         for part, found in zip(parts, map_parallel(executor, run_jobs, work), strict=True):
-            self._store.add(dict(zip(part, found, strict=True)))
+            self._store.add(dict(zip(part, found, strict=True)), new)
             self.runs += sum(len(new[key].cases) for key in part)
             self._told(self.runs)
         return [[self._store.known[key] for key in of_job] for of_job in keys]
@@ -237,7 +146,7 @@ def _watch(
         try:
             seen = loops.go_on(round(STRETCH_S * late * rate))
         except (ArithmeticError, ElementError):
-            failed.update((wall, Failure(jobs[wall].cases[case].words, 0.0, gone=True)) for wall, case in members)
+            failed.update((wall, _failure(jobs[wall].cases[case], 0.0, True, None, 0)) for wall, case in members)
             return
         bad, found = seen.gone, None
         if stretch >= first:
@@ -249,16 +158,15 @@ def _watch(
             before = np.where(felt, found.times_felt, 0.0)
         for place in np.flatnonzero(bad).tolist():
             wall, case = members[place]
-            failure = _failure(
-                jobs[wall].cases[case].words, (stretch + 1) * STRETCH_S * late, seen.gone[place], found, place
-            )
+            failure = _failure(jobs[wall].cases[case], (stretch + 1) * STRETCH_S * late, seen.gone[place], found, place)
             worst = failed.setdefault(wall, failure)
             if worst.at_s == failure.at_s and worst.times_felt < failure.times_felt:
                 failed[wall] = failure
 
 
-def _failure(case: str, at_s: float, gone: bool, found: Buzz | None, place: int) -> Failure:
+def _failure(case: Case, at_s: float, gone: bool, found: Buzz | None, place: int) -> Failure:
     if gone or found is None:
-        return Failure(case, at_s, gone=True)
+        return Failure(case.words, at_s, gone=True, tried=case)
     motion_m, force_N, frequency_Hz, times_felt = (float(column[place]) for column in found[1:5])
-    return Failure(case, at_s, False, motion_m, force_N, frequency_Hz, times_felt, bool(found.by_force[place]))
+    by_force = bool(found.by_force[place])
+    return Failure(case.words, at_s, False, motion_m, force_N, frequency_Hz, times_felt, by_force, case)

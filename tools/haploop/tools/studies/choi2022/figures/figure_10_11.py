@@ -63,7 +63,14 @@ def make_10(work: Work) -> list[Finding]:
     bears = ", ".join(f"{SHORT[kind]} {one.describe()}" for kind, one in most.items())
     *others, uni = (most[kind] for kind in KINDS[1:])
     is_first = all(beats(uni, one) for one in others)
-    work.conclude("first" if is_first else "not_first", supports=is_first, starts=len(uni.steady), bears=bears)
+    contacts = sum(len(one.steady) for one in most.values())
+    computed = {
+        "starts": len(uni.steady),
+        "bears": bears,
+        "contacts": contacts,
+        "felt": contacts - sum(one.unfelt for one in most.values()),
+    }
+    work.conclude("first" if is_first else "not_first", supports=is_first, **computed)
     work.notes = [_words(work, most), _why(work, setup)]
     return _findings(work, grids, most, bears)
 

@@ -1,0 +1,63 @@
+"""The figure of an advice: every mark has its number, nothing has a length, and both panels share an axis."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from haploop.tools.advise.advice import Advice, Changed
+from haploop.tools.advise.families import BOTH, DAMPING, NOTHING
+from haploop.tools.advise.figure import figure_of
+from haploop.tools.advise.known import Formula, Published
+from haploop.tools.advise.search import Found
+from haploop.tools.advise.walls.limit import Limit
+from haploop.tools.advise.withstand import Best
+
+
+def limit(stiffness_N_m: float) -> Limit:
+    return Limit(stiffness_N_m, 1.1 * stiffness_N_m)
+
+
+ALONE = Best(NOTHING, (), limit(2100.0))
+DAMPED = Best(DAMPING, (1.1,), limit(2900.0), limit(1700.0))
+TWO = Best(BOTH, (1.1, 2e-3), limit(3100.0), limit(2000.0))
+FOUND = Found((ALONE, DAMPED, TWO), DAMPED, 1640.0, None, None, 10, fell=((TWO, 1530.0),), alone_N_m=910.0)
+NONE_KNOWN = Formula("K <= 2 b / T", "", "", "its source", 0.0)
+ADVICE = Advice(
+    name="mine", notes=(), is_ideal=False, tried_by="a tap", uncertain={}, not_varied=(), found=FOUND,
+    formulas=(NONE_KNOWN, replace(NONE_KNOWN, stiffness_N_m=math.inf)), published=(Published(800.0, "a maker", ""),),
+    described=limit(2900.0), changed=(Changed("ticks twice as often", limit(5800.0), 2.0),),
+    without=(Changed("no friction", limit(127.0), 0.04), Changed("no actuator", limit(2750.0), 0.95)), assumed=(),
+    own=None, scene=None, breaks=None, runs=1,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def panels():
+    return figure_of(ADVICE).get_axes()
+
+
+def beside(ax, row):
+    return [text.get_text() for text in ax.texts if text.xy[1] == row]
+
+
+def test_what_holds_in_every_corner_stands_beside_what_holds_as_described(panels):
+    walls, changes = panels
+    assert beside(walls, 0) == ["0.91 N/mm", "2.1 N/mm"]
+    assert beside(walls, 1) == ["1.64 N/mm", "2.9 N/mm"]
+    assert beside(walls, 2) == ["below 1.53 N/mm", "3.1 N/mm"], (
+        "the wall at which the attack broke it is not one it bears"
+    )
+    assert [beside(walls, row)[1] for row in (3, 4, 5)] == ["0 N/mm", "any", "0.80 N/mm"]
+    assert [beside(changes, row)[1] for row in range(3)] == ["5.8 N/mm", "0.13 N/mm", "2.8 N/mm"]
+
+
+def test_both_panels_have_one_axis_from_and_to_round_numbers_and_no_bar_whose_length_would_mean_nothing(panels):
+    assert [ax.get_xlim() for ax in panels] == [(0.1, 10.0)] * 2
+    assert not any(ax.patches for ax in panels)
+
+
+def test_every_kind_of_mark_is_in_a_legend(panels):
+    walls, changes = ([text.get_text() for text in ax.get_legend().get_texts()] for ax in panels)
+    assert walls == ["as described", "in every corner", "formula", "published"]
+    assert set(changes) == {"stiffer", "softer", "as stiff within a tenth", "as described"}

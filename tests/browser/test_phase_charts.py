@@ -1,0 +1,64 @@
+"""Loops of the page: pressing and releasing told apart, the ideal spring beside them, and words where there is none."""
+
+import math
+
+import pytest
+from playwright.sync_api import expect
+
+from helpers.live.browser import seen
+from oracles.snapshots import contact, snapshot, table
+
+
+@pytest.mark.slow
+def test_without_wall_or_inertia_the_loops_say_that_there_is_none(stand_in, page):
+    stand_in.show(snapshot(0.0, 2.0, table("position", 0.0, 5e-3, ("x", "m", "position", [0.001] * 400))))
+    expect(page.locator("#loop .absent")).to_contain_text("No wall")
+    expect(page.locator("#momentum .absent")).to_contain_text("No virtual inertia")
+    stand_in.show(contact())
+    expect(page.locator("#loop .absent")).to_be_empty()
+    expect(page.locator("#loop .legend")).to_contain_text("ideal spring")
+    expect(page.locator("#momentum .legend")).to_contain_text("unidirectional-inertia")
+
+
+@pytest.mark.slow
+def test_pressing_and_releasing_are_told_apart_anew_in_every_snapshot(stand_in, page):
+    """A straight way in and, in the next snapshot, the same way out: each has the one colour and not the other."""
+    way_in = [1e-5 * i for i in range(1, 201)]
+    for depth, colour, other in ((way_in, "pressing", "releasing"), (way_in[::-1], "releasing", "pressing")):
+        force = [150 * d for d in depth]
+        loop = table("loop", 0.0, 1e-3, ("penetration", "m", "", depth), ("force", "N", "", force))
+        stand_in.show(snapshot(0.0, 0.2, {**loop, "stiffness": None}))
+        expect(page.locator("#loop .legend button")).to_have_count(2)
+        page.wait_for_timeout(200)
+        parts = [0.4 + 0.01 * i for i in range(20)]
+        assert any(seen(page, "loop", parts, colour)), colour
+        assert not any(seen(page, "loop", parts, other)), colour
+
+
+def test_the_ideal_spring_is_as_steep_as_the_wall(stand_in, page):
+    """At the deepest point its line and a loop of the same stiffness meet; of half the stiffness, they do not."""
+    depth = [0.002 * math.sin(math.pi * i / 199) for i in range(200)]
+
+    def spring(stiffness):
+        rows = table("loop", 0.0, 1e-3, ("penetration", "m", "", depth), ("force", "N", "", [150 * d for d in depth]))
+        return snapshot(0.0, 0.2, {**rows, "stiffness": stiffness})
+
+    def height(stiffness):
+        """Where the dashed line is, near the deepest point, when the loop itself is hidden."""
+        stand_in.show(spring(stiffness))
+        expect(page.locator("#loop .legend button")).to_have_count(3)
+        parts = [0.84 + 0.005 * i for i in range(9)]
+        found = [place for place in seen(page, "loop", parts, "ink") if place]
+        assert found
+        return sum(first for first, _ in found) / len(found)
+
+    stand_in.show(spring(150.0))
+    for name in ("pressing", "releasing"):
+        page.locator("#loop .legend").get_by_text(name).click()
+    steep = height(150.0)
+    settled_at = page.locator("#loop .legend button[aria-pressed=false]")
+    expect(settled_at).to_have_count(2)
+    assert steep < 0.25
+    stand_in.show(spring(75.0))
+    page.wait_for_timeout(200)
+    assert height(75.0) > steep + 0.3

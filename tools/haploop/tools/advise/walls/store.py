@@ -1,0 +1,129 @@
+"""Results of walls that were tried, kept in a readable file so that an interrupted advice goes on."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Self
+
+from haploop.launch.spec import OutputError
+from haploop.protocol.scene.scene import ElementTable, Scene
+from haploop.tools.advise.walls.cases import Case
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A wall to be tried: its stiffness and the elements with it."""
+
+    stiffness_N_m: float
+    elements: tuple[ElementTable, ...] = ()
+
+
+@dataclass(frozen=True)
+class Failure:
+    """What a wall does in the case that it does not bear.
+
+    Attributes:
+        case: in words; or why it cannot be told, with a frequency of 0.
+        at_s: end of the stretch in which it was seen.
+        gone: whether the device left its limits; the numbers are of no meaning then.
+        motion_m, force_N, frequency_Hz, times_felt, by_force: of that stretch, as of ``Buzz``.
+        tried: the case; None where it cannot be told.
+    """
+
+    case: str
+    at_s: float
+    gone: bool
+    motion_m: float = 0.0
+    force_N: float = 0.0
+    frequency_Hz: float = 0.0
+    times_felt: float = 0.0
+    by_force: bool = False
+    tried: Case | None = None
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any]) -> Self:
+        """Makes it from what ``dataclasses.asdict`` and JSON have made of it; TypeError where it is none."""
+        case = data.get("tried")
+        tried = case and Case(**{**case, "corner": tuple((str(name), factor) for name, factor in case["corner"])})
+        return cls(**{**data, "tried": tried})
+
+
+@dataclass(frozen=True)
+class Job:
+    """Walls that are tried on one loop, all in the same cases."""
+
+    loop: Scene
+    walls: tuple[Tried, ...]
+    cases: tuple[Case, ...]
+
+    def as_told(self) -> dict[str, Any]:
+        """Returns what is tried of its first wall, to be read; a loop is told by digits that another does not have."""
+        wall = self.walls[0]
+        return {
+            "wall_N_m": float(f"{wall.stiffness_N_m:.4g}"),
+            "elements": [element.as_dict() for element in wall.elements],
+            "cases": len(self.cases),
+            "first_case": self.cases[0].words if self.cases else "",
+            "loop": _digest(repr(self.loop))[:6],
+        }
+
+
+class Store:
+    """Failures of walls, or None, by a key that has everything in it that decides: a changed scene finds nothing.
+
+    A JSON object a line in a file, so that an interrupted advice goes on; several may add to one file. What is no such
+    line, as after a kill or on a full disk, is passed over, and its wall tried again.
+
+    Args:
+        file: JSON lines, read and added to; None keeps nothing.
+
+    Raises:
+        OutputError: the file cannot be read, or added to.
+    """
+
+    def __init__(self, file: Path | None = None) -> None:
+        self._file, self._version = file, version("haploop")
+        self.known: dict[str, Failure | None] = {}
+        with self._writable():
+            text = file.read_text(encoding="utf-8", errors="replace") if file and file.exists() else ""
+        for line in text.split("\n"):
+            with contextlib.suppress(ValueError, TypeError, KeyError, AttributeError):
+                told = json.loads(line)
+                key, fails = str(told["key"]), told["fails"]
+                self.known[key] = None if fails is None else Failure.from_data(fails)
+
+    def key(self, loop: Scene, wall: Tried, cases: Sequence[Case]) -> str:
+        """Returns the key of a trial: loop, wall, cases and the version of haploop."""
+        return _digest(repr((self._version, loop, wall, tuple(cases))))
+
+    def add(self, results: Mapping[str, Failure | None], jobs: Mapping[str, Job]) -> None:
+        """Keeps results by their keys, on disk at once, whole lines after whatever is there; of each what was tried."""
+        self.known |= results
+        if not self._file:
+            return
+        lines = (
+            json.dumps(jobs[key].as_told() | {"fails": asdict(failure) if failure else None, "key": key})
+            for key, failure in results.items()
+        )
+        with self._writable(), self._file.open("ab") as file:
+            file.write("\n".join(["", *lines, ""]).encode())
+
+    @contextlib.contextmanager
+    def _writable(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise OutputError(
+                f"{self._file}, where what was tried is kept, cannot be used: {error.strerror}. Make room or give "
+                "another directory with --out; with the same one, what is in it already is not tried again."
+            ) from error
+
+
+def _digest(told: str) -> str:
+    return hashlib.sha256(told.encode()).hexdigest()[:24]
