@@ -156,8 +156,6 @@ GARBAGE = [
     '{"type": "watch", "points": true}',
     '{"type": "watch", "points": Infinity}',
     '{"type": "watch", "end_s": []}',
-    '{"type": "drawn", "snapshots": 0}',
-    '{"type": "drawn", "snapshots": true}',
     '{"type": "command"}',
     '{"type": "command", "verb": 1}',
     '{"type": "command", "verb": "pause", "arguments": []}',

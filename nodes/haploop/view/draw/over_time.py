@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -129,12 +130,17 @@ def over_time(history: History, interval: Interval) -> list[Table | None]:
 
 
 def overview(history: History) -> Table:
-    """Returns the position over the whole run, the two extremes of each of its parts."""
-    first, end, rate = history.first_tick or 0, history.end_tick, history.time.control_rate
+    """Returns the position over the whole run, the two extremes of each of its parts that is complete."""
+    first, end = history.first_tick or 0, history.steps.end_tick
     bucket = 1 << max(0, math.ceil(math.log2(max(1, end - first) / _OVERVIEW_PARTS)))
     bucket = history.steps.bucket_from(first, bucket)
     begins = history.steps.aligned(first, bucket)
-    values = history.steps.envelope(["x"], begins, end + (begins - end) % bucket, bucket)
+    return _overview(history, begins, max(begins + bucket, end - (end - begins) % bucket), bucket)
+
+
+@lru_cache(maxsize=1)
+def _overview(history: History, begins: int, end: int, bucket: int) -> Table:
+    values, rate = history.steps.envelope(["x"], begins, end, bucket), history.time.control_rate
     columns = [Column("x", "m", "position")]
     return Table("overview", (begins + bucket / 4.0) / rate, bucket / 2.0 / rate, columns, values, envelope=True)
 

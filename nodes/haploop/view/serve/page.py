@@ -68,9 +68,10 @@ class Page:
             with contextlib.suppress(asyncio.CancelledError):
                 await showing
 
-    async def _take(self, message: Viewport | Command | int) -> None:
-        if isinstance(message, int):
-            self._undrawn = max(0, self._undrawn - message)
+    async def _take(self, message: Viewport | Command | None) -> None:
+        if message is None:
+            self._undrawn = max(0, self._undrawn - 1)
+            await self._send_snapshot()
             return
         if isinstance(message, Viewport):
             self._viewport = message
@@ -151,8 +152,8 @@ class Command:
     arguments: Message
 
 
-def parse_message(text: str) -> Viewport | Command | int:
-    """Returns what a text says: ``watch`` as a viewport, ``command`` as a command, ``drawn`` as how many snapshots.
+def parse_message(text: str) -> Viewport | Command | None:
+    """Returns what a text says: ``watch`` as a viewport, ``command`` as a command, ``drawn`` of a snapshot as None.
 
     Raises:
         BadMessage: it says anything else.
@@ -165,10 +166,7 @@ def parse_message(text: str) -> Viewport | Command | int:
         case {"type": "watch"}:
             return _watch(message)
         case {"type": "drawn"}:
-            count = message.get("snapshots", 1)
-            if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-                raise BadMessage("drawn.snapshots must be a whole number above 0.")
-            return count
+            return None
         case {"type": "command", "id": int(number), "verb": str(verb)}:
             token, arguments = message.get("token"), message.get("arguments", {})
             if isinstance(arguments, dict):

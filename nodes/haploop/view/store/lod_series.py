@@ -8,12 +8,12 @@ import numpy as np
 
 from haploop.view.store.lod_level import LodLevel, Ring, extremes
 
-# Buckets of a level that make one of the next.
-FOLD = 2
+# Buckets of a level that make one of the next: fewer levels cost less, and twice the buckets make up for it.
+FOLD = 4
 # Rows of a bucket of the first coarse level, at least.
 _LEAST_ROWS = 4
 # Buckets that a coarse level holds at least, two values each.
-_BUCKETS = 2048
+_BUCKETS = 4096
 # Ticks for which buckets are made at once, and buckets of the coarser levels; fewer are not worth the calls.
 _AT_ONCE_TICKS, _AT_ONCE_BUCKETS = 128, 8
 # Columns that are kept, at most: elements come and go.
@@ -24,7 +24,7 @@ class LodSeries:
     """Keeps rows of named columns, a whole number of them a tick, from tick ``origin`` on.
 
     Level 0 holds the newest rows, of ``recent_ticks`` at least. Every other level holds the least and the greatest of
-    buckets of some ticks, twice as many as on the level before it; before a level would forget its oldest buckets there
+    buckets of some ticks, ``FOLD`` times as many as on the level before it; before a level would forget its oldest buckets there
     is a next one, so that some level always reaches back to the origin. So memory grows with the logarithm of the run's
     length alone.
 

@@ -25,21 +25,28 @@ export function sign(element, shape, word) {
 // What is due waits so long for the next picture, to be part of it: a picture of its own costs the browser as much again.
 const NEXT_PICTURE_MS = 50;
 
-/** What texts need to be read: `act`, at most once in so many ms, the last time with the last arguments. */
-export function seldom(act, gap_ms = 120) {
-  let [due, timer, last] = [0, 0, []];
+/** A beat: what it makes of acts is done at most once in `gap_ms`, all in one picture, the last time with the last arguments. */
+export function beat(gap_ms) {
+  const waiting = new Map();
+  let [due, timer] = [0, 0];
   const run = () => {
+    if (!waiting.size) return;
     clearTimeout(timer);
     [due, timer] = [performance.now() + gap_ms, 0];
-    act(...last);
+    const acts = [...waiting];
+    waiting.clear();
+    for (const [act, last] of acts) act(...last);
   };
-  return (...now) => {
-    last = now;
+  return (act) => (...now) => {
+    waiting.set(act, now);
     const wait_ms = due - performance.now();
-    if (wait_ms <= 0) run();
+    if (wait_ms <= 0) queueMicrotask(run);
     else timer ||= setTimeout(run, wait_ms + NEXT_PICTURE_MS);
   };
 }
+
+/** What texts need to be read: often enough for the eye, and one layout for all of them. */
+export const seldom = beat(120);
 
 /** Tells `turned` whether an element can be seen, whenever that changes: what cannot be seen need not be drawn. */
 export function onSight(element, turned) {

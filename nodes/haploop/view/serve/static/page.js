@@ -1,7 +1,7 @@
 // The page: what the server tells goes to the charts, tables and forms; what is done with them goes back to it.
 
 import { Charts } from "./charts.js";
-import { byId, put } from "./dom.js";
+import { byId, put, seldom } from "./dom.js";
 import { showEvents } from "./events.js";
 import { showHeader } from "./header.js";
 import { listen } from "./keys.js";
@@ -25,10 +25,9 @@ import { ViewControls } from "./view_controls.js";
 let state = { phase: "waiting", nodes: [] };
 let connected = false;
 let marks = [];
-let newest = null;
 let snapshot = null;
-let arrived = 0;
 let drawn = 0;
+const waiting = [];
 
 const phase = () => (connected ? state.phase : "lost");
 
@@ -71,7 +70,7 @@ function onState(now) {
   viewport.first_s = now.first_s ?? 0;
   viewport.last_s = now.control_rate ? now.tick / now.control_rate : 0;
   if (isNew) newRun();
-  showState();
+  showSoon();
 }
 
 function newRun() {
@@ -97,6 +96,8 @@ function showState() {
   allow(phase(), state.why);
 }
 
+const showSoon = seldom(showState); // with the texts of the charts, in one picture
+
 function onRuns(listing) {
   runs.update(listing);
 }
@@ -107,18 +108,15 @@ function onEvents(events) {
   redraw();
 }
 
-/** Only the newest snapshot is ever drawn; one that came too early for the screen is forgotten. */
+/** Every snapshot is a picture of its own: the server sends no third one before the first is drawn. */
 function onSnapshot(buffer) {
-  if (!newest) requestAnimationFrame(draw);
-  newest = buffer;
-  arrived += 1;
+  if (waiting.push(buffer) === 1) requestAnimationFrame(draw);
 }
 
 function draw() {
-  snapshot = decode(newest);
-  stream.send({ type: "drawn", snapshots: arrived }); // the next one is made meanwhile
-  newest = null;
-  arrived = 0;
+  snapshot = decode(waiting.shift());
+  stream.send({ type: "drawn" }); // the next one is made meanwhile
+  if (waiting.length) requestAnimationFrame(draw);
   drawn += 1;
   redraw();
 }

@@ -2,7 +2,7 @@
 
 import { BudgetPanel } from "./budget_panel.js";
 import { ComparePanel } from "./compare_panel.js";
-import { byId, seldom } from "./dom.js";
+import { beat, byId, seldom } from "./dom.js";
 import { MotionPanel } from "./motion_panel.js";
 import { OwnPanel } from "./own_panel.js";
 import { PhasePlots } from "./phase_plots.js";
@@ -24,7 +24,7 @@ export class Panels {
       own: new OwnPanel(byId("own"), viewport),
     };
     // Bars and tables are read, not watched; of a loop, some pictures a second are enough.
-    this.panels.loops.show = seldom(this.panels.loops.show.bind(this.panels.loops), LOOPS_MS);
+    this.panels.loops.show = beat(LOOPS_MS)(this.panels.loops.show.bind(this.panels.loops));
     for (const panel of [this.panels.energy, this.panels.compare]) panel.show = seldom(panel.show.bind(panel));
     this.tabs = [...document.querySelectorAll("[role=tab]")];
     for (const tab of this.tabs) tab.addEventListener("click", () => this.choose(tab.dataset.panel));

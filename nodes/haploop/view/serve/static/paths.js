@@ -1,5 +1,7 @@
 // Paths through the points of a uPlot chart, broken where a number is not there (NaN).
 
+import { colour } from "./palette.js";
+
 /** From data to canvas pixels; what a path needs, worked out once for all its points. */
 function projection(u) {
   const { left, top, width, height } = u.bbox;
@@ -70,50 +72,57 @@ export function strips(u, xs, ys) {
   return way > ROUGH * u.bbox.height ? found : null;
 }
 
+// Strips are drawn on a sheet of their own, which is laid on the chart: a rectangle for each takes thrice as long.
+const sheet = new OffscreenCanvas(1, 1);
+let buffer = new ArrayBuffer(0);
+
 /** Draw strips as wide as a line, and dashed; where they cover the same heights again and again, faintly within edges. */
-export function drawStrips(u, found, { width, dash = [] }) {
-  const { left, top, width: wide, height: tall } = u.bbox;
+export function drawStrips(u, found, { colour: name, width, dash = [] }) {
+  const [left, top, wide, tall] = [u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height].map(Math.round);
+  if (buffer.byteLength < 4 * wide * tall) buffer = new ArrayBuffer(4 * wide * tall);
+  const pixels = new Uint32Array(buffer, 0, wide * tall).fill(0);
+  const column = (x, from, to, pixel) => {
+    const end = Math.min(tall, to) * wide;
+    for (let at = Math.max(0, from) * wide + x; at < end; at += wide) pixels[at] = pixel;
+  };
   const pen = Math.max(1, Math.round(width * devicePixelRatio));
-  const pattern = dash.flatMap((length, i) => Array(length).fill(i % 2 === 0));
-  const isGap = (x) => dash.length && pattern[Math.floor((x - left) / devicePixelRatio) % pattern.length] === false;
+  const pattern = dash.flatMap((length, i) => Array(length).fill(i % 2 === 1));
+  const [full, faint] = [1, FAINT].map((alpha) => pixelOf(name, alpha));
+  const isFaint = coversTheSame(found);
+  for (let i = 0; i < found.length; i += 4) {
+    const from = Math.round(found[i + 2] - top - pen / 2);
+    const to = Math.max(from + pen, Math.round(found[i + 3] - top + pen / 2));
+    const isThick = to - from > THICK * pen;
+    const begin = found[i] - left;
+    for (let x = Math.max(0, begin); x < Math.min(wide, begin + found[i + 1]); x++) {
+      const isGap = pattern[Math.floor(x / devicePixelRatio) % pattern.length];
+      const edge = !isGap ? full : isThick ? faint : 0; // a peak is not left out between two dashes
+      column(x, from, to, isFaint && isThick ? faint : edge);
+      if (!isFaint || !isThick) continue;
+      column(x, from, from + pen, edge);
+      column(x, to - pen, to, edge);
+    }
+  }
+  if (sheet.width < wide || sheet.height < tall) Object.assign(sheet, { width: wide, height: tall });
+  sheet.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(buffer, 0, 4 * wide * tall), wide, tall), 0, 0);
+  u.ctx.drawImage(sheet, 0, 0, wide, tall, left, top, wide, tall);
+}
+
+/** Whether strips fill much of what they cover together. */
+function coversTheSame(found) {
   let [low, high, sum] = [Infinity, -Infinity, 0];
   for (let i = 0; i < found.length; i += 4) {
     if (found[i + 2] < low) low = found[i + 2];
     if (found[i + 3] > high) high = found[i + 3];
     sum += found[i + 3] - found[i + 2];
   }
-  const isFaint = (4 * sum) / found.length > FILLED * (high - low);
-  u.ctx.save();
-  u.ctx.beginPath();
-  u.ctx.rect(left, top, wide, tall);
-  u.ctx.clip();
-  for (const part of isFaint ? ["within", "top", "bottom"] : ["whole"]) {
-    // Neighbours of the same height, in whole pixels, are one rectangle.
-    let [begin, end, from, to, alpha] = [0, 0, 0, 0, 0];
-    const fill = () => {
-      u.ctx.globalAlpha = alpha;
-      if (to > from) u.ctx.fillRect(begin, from, end - begin, to - from);
-    };
-    for (let i = 0; i < found.length; i += 4) {
-      const x = found[i];
-      let y0 = Math.round(found[i + 2] - pen / 2);
-      let y1 = Math.max(y0 + pen, Math.round(found[i + 3] + pen / 2));
-      const isThick = y1 - y0 > THICK * pen;
-      const isBetween = part !== "within" && isGap(x);
-      if (isBetween && !isThick) y1 = y0; // a peak is not left out between two dashes
-      else if (part === (isThick ? "top" : "")) y1 = y0 + pen;
-      else if (part === "bottom") y0 = isThick ? y1 - pen : y1;
-      else if (part === "within" && !isThick) y1 = y0;
-      const strength = isBetween || part === "within" ? FAINT : 1;
-      if (x !== end || y0 !== from || y1 !== to || strength !== alpha) {
-        fill();
-        [begin, from, to, alpha] = [x, y0, y1, strength];
-      }
-      end = x + found[i + 1];
-    }
-    fill();
-  }
-  u.ctx.restore();
+  return (4 * sum) / found.length > FILLED * (high - low);
+}
+
+/** A colour of the page as the number of a pixel. */
+function pixelOf(name, alpha) {
+  const [red, green, blue] = colour(name).match(/[0-9a-f]{2}/gi).map((two) => parseInt(two, 16));
+  return ((Math.round(255 * alpha) << 24) | (blue << 16) | (green << 8) | red) >>> 0;
 }
 
 /** Small squares at all points. */

@@ -86,7 +86,7 @@ export class TimeChart {
         bind: { dblclick: () => () => this.viewport.live() },
       },
       hooks: {
-        drawSeries: [(u, i) => this.rough[i] && this.drawRough(u, this.rough[i], this.lines[i - 1].line)],
+        drawSeries: [(u, i) => this.rough[i] && drawStrips(u, this.rough[i], this.lines[i - 1].line)],
         drawClear: [(u) => this.shade(u)],
         draw: [(u) => this.layOver(u), (u) => drawMarks(u, this.marks), (u) => drawMeasured(u, this.viewport.measured)],
         setCursor: [() => this.tell()],
@@ -165,7 +165,7 @@ export class TimeChart {
     if (!this.overlay) return undefined;
     const [t, values] = [times(this.overlay), scaled(this.overlay.columns[0].values, this.unit.factor)];
     const rough = strips(u, t, values);
-    if (rough) return this.drawRough(u, rough, OVERLAY);
+    if (rough) return drawStrips(u, rough, OVERLAY);
     u.ctx.save();
     u.ctx.beginPath();
     u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
@@ -174,13 +174,6 @@ export class TimeChart {
     u.ctx.lineWidth = OVERLAY.width * devicePixelRatio;
     u.ctx.stroke(linePath(u, t, values));
     return u.ctx.restore();
-  }
-
-  drawRough(u, found, line) {
-    u.ctx.save();
-    u.ctx.fillStyle = colour(line.colour);
-    drawStrips(u, found, line);
-    u.ctx.restore();
   }
 
   /** The numbers under the cursor, or the last ones. */
