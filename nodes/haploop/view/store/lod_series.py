@@ -24,9 +24,9 @@ class LodSeries:
     """Keeps rows of named columns, a whole number of them a tick, from tick ``origin`` on.
 
     Level 0 holds the newest rows, of ``recent_ticks`` at least. Every other level holds the least and the greatest of
-    buckets of some ticks, ``FOLD`` times as many as on the level before it; before a level would forget its oldest buckets there
-    is a next one, so that some level always reaches back to the origin. So memory grows with the logarithm of the run's
-    length alone.
+    buckets of some ticks, ``FOLD`` times as many as on the level before it; before a level would forget its oldest
+    buckets there is a next one, so that some level always reaches back to the origin. So memory grows with the
+    logarithm of the run's length alone.
 
     Attributes:
         first_tick: first tick that is known; None before anything is.
