@@ -112,7 +112,7 @@ class RunMeasures(NamedTuple):
         window = self.window
         rule = (
             f"In {_WINDOW} x crossed its trend line {window.crossings} "
-            f"times by more than {self.swing_m * 1e6:.3g} um, its second half {window.growth:.2f} times as wide as its "
+            f"times by more than {self.swing_m * 1e6:.3g} µm, its second half {window.growth:.2f} times as wide as its "
             f"first; a limit cycle is at least {CROSSINGS} crossings and 0.5 times."
             if window.touched
             else f"No tick of {_WINDOW} was in contact."

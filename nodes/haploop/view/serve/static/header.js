@@ -14,7 +14,7 @@ const NOT_YET = { awaited: "being judged", unknown: "not known" };
 
 /** What there is of a verdict, in a word. */
 export const told = ({ verdict, verdict_is: is, sight, phase }) =>
-  NOT_YET[is] ?? (isJudged({ verdict, verdict_is: is }) ? verdict : sight?.so_far && phase === "ended" ? "too short" : sight?.word);
+  isJudged({ verdict, verdict_is: is }) ? verdict : (NOT_YET[is] ?? (sight?.so_far && phase === "ended" ? "too short" : sight?.word));
 
 /** Whether there is a word that more than what was seen stands behind. */
 export const isJudged = ({ verdict, verdict_is: is }) => is === "judged" || verdict === "diverged";
@@ -48,7 +48,7 @@ function showVerdict(state) {
   const known = VERDICTS.has(word) ? word : "none";
   const sought = byId("verdict");
   sought.dataset.verdict = known;
-  sought.dataset.is = state.verdict_is ?? "seen";
+  sought.dataset.is = isJudged(state) ? "judged" : (is ?? "seen");
   sought.title = (isJudged(state) ? state.verdict_rule : sight?.why) ?? "";
   put(byId("seen"), isJudged(state) ? moved(state) : is in NOT_YET ? "" : seen(sight));
   sign(sought, `verdict-${known}`, told(state) || "no verdict");

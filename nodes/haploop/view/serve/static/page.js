@@ -15,7 +15,7 @@ import { saveData, savePicture } from "./save.js";
 import { Scrubber } from "./scrubber.js";
 import { Sound } from "./sound.js";
 import { SetForm } from "./set_form.js";
-import { allow, obstacle, Steering } from "./steering.js";
+import { allow, obstacle, say, Steering } from "./steering.js";
 import { Stream } from "./stream.js";
 import { showSummary } from "./summary.js";
 import { SwapForm } from "./swap_form.js";
@@ -77,6 +77,7 @@ function newRun() {
   viewport.live();
   charts.refit();
   swapForm.forget();
+  say({ ok: true, text: "" }); // an answer was of the run before
 }
 
 function showState() {

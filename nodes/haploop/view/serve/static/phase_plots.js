@@ -23,8 +23,8 @@ const inPixels = (size) => (u, xs, ys) => dots(u, xs, ys, size * devicePixelRati
 
 export class PhasePlots {
   constructor(loop, momentum) {
-    this.loop = new PhaseChart(loop, { x: "penetration (mm)", y: "force (N)", least: [0.01, 0.001] });
-    this.momentum = new PhaseChart(momentum, { x: "velocity (m/s)", y: "momentum (g m/s)", least: [1e-4, 1e-4] });
+    this.loop = new PhaseChart(loop, { x: "penetration (mm)", y: "force (N)", least: [0.01, 0.01] });
+    this.momentum = new PhaseChart(momentum, { x: "velocity (m/s)", y: "momentum (g m/s)", least: [1e-3, 0.01] });
     this.charts = [this.loop, this.momentum];
   }
 
