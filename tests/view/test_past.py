@@ -8,7 +8,7 @@ import pytest
 from haploop.launch import load, run
 from haploop.launch.runs.run_files import recorded_scene
 from haploop.tools.cli.view import LiveRuns
-from haploop.view.draw.messages import state
+from haploop.view.draw.messages import event_lines, state
 from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.receive.past_session import PastSession
 from haploop.view.receive.runs import CommandFailed
@@ -34,6 +34,11 @@ def test_a_recorded_run_is_opened_with_its_numbers_events_and_verdict(recorded):
     assert told["summary"]["trajectory_sha256"] == recorded.summary["trajectory_sha256"]
     assert told["verdict"] == recorded.summary["verdict"]
     assert [tick for tick, event in session.events if "swap" in event] == [1200]
+    (swap,) = event_lines(session.events, 1000, session.clock.units)
+    assert swap["text"] == "element 0 becomes damping (damping 0.8 N s/m)"
+    set_keys = found["first"].units(session.scene, ["wall.stiffness", "dissipation.0.mass", "dissipation.7.mass"])
+    assert set_keys.items() >= {"wall.stiffness": "N/m", "dissipation.0.mass": "kg"}.items()
+    assert "dissipation.7.mass" not in set_keys
     shown = decode(snapshot(session.history, Viewport(0.2, 2000, 1.0), session.changes))
     x = shown["tables"]["position"]["values"]["x"]
     assert np.array_equal(x, recorded["/plant"]["x"][8000:10000].astype(np.float32))

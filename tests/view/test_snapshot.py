@@ -204,11 +204,7 @@ ALWAYS = {"swap": {"kind": "damping", "damping": 0.8, "acts": "always"}}
     ],
 )  # fmt: skip
 def test_an_event_is_told_in_words_with_its_units(event, text):
-    options = {
-        "kinds": {"damping": {"parameters": {"damping": {"unit": "N s/m"}}}},
-        "settable": {"wall.stiffness": {"unit": "N/m"}},
-    }
-    (line,) = event_lines([(1500, event)], 1000, options)
+    (line,) = event_lines([(1500, event)], 1000, {"damping.damping": "N s/m", "wall.stiffness": "N/m"})
     assert (line["tick"], line["t_s"], line["text"]) == (1500, 1.5, text)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
@@ -145,16 +145,8 @@ class EventLine(TypedDict):
     text: str
 
 
-def event_lines(events: Iterable[tuple[int, Event]], rate: int, options: Message | None) -> list[EventLine]:
-    """Returns the newest of these events as lines.
-
-    Args:
-        options: what the run lets people choose, for units by parameter of a kind (``damping.damping``) and by settable
-            key; None before it is known.
-    """
-    kinds, settable = (options or {}).get("kinds", {}), (options or {}).get("settable", {})
-    units = {f"{kind}.{name}": p["unit"] for kind, about in kinds.items() for name, p in about["parameters"].items()}
-    units |= {key: about["unit"] for key, about in settable.items()}
+def event_lines(events: Iterable[tuple[int, Event]], rate: int, units: Mapping[str, str]) -> list[EventLine]:
+    """Returns the newest of these events as lines; ``units`` as in :func:`haploop.protocol.changes.describe`."""
     lines: list[EventLine] = []
     for tick, event in events:
         if kind := next((kind for kind in KINDS if kind in event), None):

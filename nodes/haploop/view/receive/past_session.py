@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from haploop.logger.log.stream import LogStream
+from haploop.protocol.changes import changes_of, spans
 from haploop.protocol.ticks import Timebase
 from haploop.view.receive.ingest import Backfill
 from haploop.view.receive.run_session import RunSession
@@ -27,7 +28,10 @@ class PastSession(RunSession):
         for batch in LogStream(run.out, topics=("/events",)):
             if isinstance(batch.rows, list):
                 self._take([(int(event.get("tick", 0)), event) for event in batch.rows])
-        self.clock = SimpleNamespace(status={}, options=None, limit_N_m=None)  # nobody is there to answer
+        keys = {key for _, event in self.events for key in event.get("set", {})}
+        at_work = [span.scene for span in spans(scene, changes_of(self.events))]
+        units = {key: unit for now in at_work for key, unit in run.units(now, keys).items()}
+        self.clock = SimpleNamespace(status={}, options=None, limit_N_m=None, units=units)  # nobody is there to answer
         self.outcome, self.given_up = "ended", True
         backfill = Backfill(self.out, scene, time, self.events)
         backfill.read()

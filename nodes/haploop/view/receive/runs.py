@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -54,6 +54,10 @@ class PastRun(Run, Protocol):
 
     def scene(self) -> Scene:
         """Reads its resolved scene; raises OSError or LogError where there is none."""
+        ...
+
+    def units(self, scene: Scene, keys: Iterable[str]) -> Mapping[str, str]:
+        """Returns the units of these keys of a scene, and by kind and parameter (``damping.damping``)."""
         ...
 
 
@@ -115,6 +119,15 @@ class ClockAnswers:
             self._ask_now.clear()
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._ask_now.wait(), _ASK_S)
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Returns the units of settable keys, and by kind and parameter; {} before the options are known."""
+        kinds, keys = (self.options.get(name, {}) if self.options else {} for name in ("kinds", "settable"))
+        units = {
+            f"{kind}.{name}": p["unit"] for kind, about in kinds.items() for name, p in about["parameters"].items()
+        }
+        return units | {key: about["unit"] for key, about in keys.items()}
 
     async def command(self, verb: str, arguments: Message) -> str:
         """Sends a command to the run; returns its answer, a sentence, or raises CommandFailed."""

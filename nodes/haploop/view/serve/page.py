@@ -117,7 +117,7 @@ class Page:
         known = session and (session, len(session.events), session.clock.options is None)
         if known != self._sent_events:
             self._sent_events = known
-            lines = event_lines(session.events, session.time.control_rate, session.clock.options) if session else []
+            lines = event_lines(session.events, session.time.control_rate, session.clock.units) if session else []
             await self._send({"type": "events", "events": lines})
         version = session and (session, session.version)
         if version != self._sent_state or now >= self._state_due:

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -65,6 +65,13 @@ class RecordedRun:
         if scene is None:
             raise FileNotFoundError(f"There is no scene.toml in {self.out}.")
         return scene
+
+    def units(self, scene: Scene, keys: Iterable[str]) -> dict[str, str]:
+        """Returns the units of these keys of a scene, and by kind and parameter; no key that has none."""
+        from haploop.tools.figure.scene_units import element_units, unit_at
+
+        kinds = element_units()
+        return kinds | {key: unit for key in keys if (unit := unit_at(scene, key, kinds))}
 
     def make_context(self) -> SecureContext:
         """Raises: nobody is there to connect to."""

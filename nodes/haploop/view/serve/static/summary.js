@@ -36,14 +36,11 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
     "its force above 30 Hz": amount(found.force_ripple_N, "N"),
     growth: `${fixed(rate)} ± ${fixed(error, 2)} 1/s`,
     ...(found.blown ? { [`after a blow of ${amount(found.blow_N, "N")}`]: found.blown } : {}),
-    "its own in the run's swing": share(found.own_share),
+    ...(isNumber(found.own_share) ? { "its own in the run's swing": share(found.own_share) } : {}),
   };
 }
 
-function share(own) {
-  if (!isNumber(own)) return NONE;
-  return own < 0.01 ? "less than 1 %" : `${Math.round(100 * own)} %`;
-}
+const share = (own) => (own < 0.01 ? "less than 1 %" : `${Math.round(100 * own)} %`);
 
 function figures({ duration_s, ended, extremes = {}, real_time_factor: factor, lost = {} }) {
   return {
