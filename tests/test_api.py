@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.spec import RunFailed
 from haploop.logger.summary import read as read_summary
 from haploop.tools.cli.app import app
+from helpers.live.launched import PATIENCE_S, wait_for
 
 # Begins inside the wall.
 SHORT = {"duration": 0.3, "device.position": -0.0605}
@@ -81,7 +83,7 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
         loop.set({"wall.stiffness": "0.2 N/mm"}, at=0.2)
         live = loop.finish()
         assert loop.wait() is live
-        assert other.wait(60.0).summary == live.summary
+        assert other.wait(PATIENCE_S).summary == live.summary
         with pytest.raises(RunNotFound):
             loop.pause()
     written = scene.swap("unidirectional-inertia", at=tick * 1e-3, mass=0.01).set({"wall.stiffness": 200}, at=0.2)
@@ -92,9 +94,11 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
 
 @pytest.mark.slow
 def test_watching_a_live_loop_shows_what_its_log_will_hold_and_leaving_it_ends_it(tmp_path: Path) -> None:
-    with start(load("fig6b", SHORT), pace=1.0) as loop:
-        seen = list(loop.watch())
-        result = loop.wait(60.0)
+    with start(load("fig6b", SHORT), paused=True) as loop, ThreadPoolExecutor() as threads:
+        watching = threads.submit(lambda: list(loop.watch()))
+        wait_for("who watches", lambda: "observer" in {node["role"] for node in loop.status()["nodes"]})
+        result = loop.finish()
+        seen = watching.result()
     assert result.directory is None
     logged = result["/controller"]
     for block in seen:

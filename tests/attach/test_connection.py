@@ -21,9 +21,9 @@ from haploop.protocol.transport.sockets import SecureContext, Transport, connect
 
 @pytest.fixture
 def impatient(monkeypatch) -> None:
-    """What may pass is told after a second, not five; the sentences are the same."""
+    """What may pass is told sooner; silence is not, since on a busy machine others need their time to speak."""
     monkeypatch.setattr(connection, "_TOLD_AFTER_S", 0.6)
-    monkeypatch.setattr(connection, "_SILENCE_AFTER_S", 1.0)
+    monkeypatch.setattr(connection, "_SILENCE_AFTER_S", 4.0)
 
 
 @pytest.fixture
@@ -142,10 +142,10 @@ def test_a_client_may_connect_to_what_a_node_binds_and_a_stranger_may_not(keys, 
         for subscriber in subscribers:
             connect(subscriber, address, launcher.keys.known["plant"])
             subscriber.subscribe(b"plant")
-        assert publisher.poll(10_000)
+        assert publisher.poll(60_000)
         assert publisher.recv() == b"\x01plant"
         publisher.send_multipart([b"plant", b"block"])
-        assert subscribers[0].poll(10_000)
+        assert subscribers[0].poll(60_000)
         assert not publisher.poll(200), "a stranger's subscription came through"
         assert not subscribers[1].poll(0)
     finally:

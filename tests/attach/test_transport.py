@@ -14,7 +14,7 @@ from haploop.protocol.transport.addresses import TransportError
 from haploop.protocol.transport.keys import make_keys
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.sockets import Transport
-from helpers.live.launched import first_and_slowly
+from helpers.live.launched import PATIENCE_S, PATIENT, first_and_slowly, wait_for
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
 
@@ -48,12 +48,12 @@ def test_a_run_over_tcp_gives_the_bits_of_one_process_and_answers_whoever_may_as
     if keys:
         make_keys(keys)
     transport = Transport.from_options("127.0.0.1", keys)
-    settings = ["duration=1.5", "run.pin=false"]
+    settings = ["duration=1.5", "run.pin=false", PATIENT, "event=[{at=0.5, pause=true}]"]  # until all have asked
     alone = run(prepare(SCENE, settings, out=tmp_path / "alone"), in_process=True)
     results, identities = [], []
     prepared = prepare(SCENE, settings, out=tmp_path / "out")
     thread = threading.Thread(
-        target=lambda: results.append(run(prepared, transport=transport, pace=1.0, on_started=identities.append))
+        target=lambda: results.append(run(prepared, transport=transport, on_started=identities.append))
     )
     thread.start()
     while not identities:
@@ -73,7 +73,9 @@ def test_a_run_over_tcp_gives_the_bits_of_one_process_and_answers_whoever_may_as
         make_keys(tmp_path / "other")
         with pytest.raises(RunNotFound, match="has no keys"):
             find(Elsewhere(address, tmp_path / "other"))
-    thread.join(60)
+    wait_for("standstill", lambda: ask(live, "status")[1]["paused"])
+    ask(live, "resume")
+    thread.join(PATIENCE_S)
     assert results[0]["trajectory_sha256"] == alone["trajectory_sha256"]
 
 

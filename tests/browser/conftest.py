@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from helpers.live.browser import ARGUMENTS, DESK, NAMES, is_complaint
+from helpers.live.launched import PATIENCE_S
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
     from helpers.live.stand_in import StandIn
+
+PATIENCE_MS = 1000 * PATIENCE_S
 
 
 @pytest.fixture(scope="session")
@@ -24,7 +27,8 @@ def browser() -> Iterator[Browser]:
     if not found:
         pytest.skip(f"there is no browser: none of {', '.join(NAMES)} is on the path")
     with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=found, args=ARGUMENTS)
+        playwright.expect.set_options(timeout=PATIENCE_MS)
+        browser = driver.chromium.launch(executable_path=found, args=ARGUMENTS, timeout=PATIENCE_MS)
         yield browser
         browser.close()
 
@@ -37,6 +41,7 @@ def open_page(browser: Browser) -> Iterator[Callable[..., Page]]:
     def open_page(url: str, **options: Any) -> Page:
         given: dict[str, Any] = {"viewport": DESK} | options
         context = browser.new_context(**given)
+        context.set_default_timeout(PATIENCE_MS)
         contexts.append(context)
         page = context.new_page()
         origin = url.split("/#")[0].rstrip("/")

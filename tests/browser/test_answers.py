@@ -3,6 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
+from helpers.live.browser import still
 from helpers.live.stand_in import ENDED, RUNNING, SUMMARY, WAITING
 from oracles.snapshots import contact
 
@@ -29,7 +30,7 @@ def test_a_verdict_is_a_word_a_shape_of_its_own_and_a_colour(stand_in, open_page
         stand_in.state(**ENDED | {"verdict": word})
         expect(page.locator("#verdict span")).to_have_text(word)
         assert page.get_attribute("#verdict use", "href") == f"#verdict-{word}"
-        page.wait_for_timeout(200)
+        still(page)
         grounds.add(style(page, "backgroundColor"))
     assert len(grounds) == len(words)
     shapes = page.evaluate("[...document.querySelectorAll('.shapes symbol')].map(s => s.innerHTML)")
@@ -50,7 +51,7 @@ def test_what_the_window_sees_is_an_outline_and_says_that_nothing_is_known_of_st
         expect(page.locator("#verdict span")).to_have_text(word)
         expect(page.locator("#seen")).to_have_text("in 1.00–1.50 s")
         assert style(page, "borderTopStyle") == "dashed"
-        page.wait_for_timeout(200)
+        still(page)
         assert style(page, "backgroundColor") == "rgba(0, 0, 0, 0)"
     stand_in.state(sight=sight | {"word": "settling", "from_s": 1.2, "so_far": True})
     expect(page.locator("#verdict span")).to_have_text("settling")

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from helpers.live.browser import DESK, PHONE
+from helpers.live.browser import DESK, PHONE, still
 from helpers.live.stand_in import ENDED, RUNS, WAITING
 from oracles.snapshots import contact
 
@@ -40,18 +40,18 @@ def test_no_state_of_the_page_has_a_violation(stand_in, open_page, violations, s
     assert violations(page) == []
     for panel in PANELS:
         page.click(f"[data-panel={panel}]")
-        page.wait_for_timeout(100)
+        still(page)
         assert violations(page, ".beside") == [], panel
     page.set_viewport_size(PHONE)
     assert violations(page) == []
     for state in (ENDED, {"phase": "failed", "why": "The plant was killed by SIGKILL.", "options": None}):
         stand_in.state(**state)
         expect(page.locator("#phase")).to_have_text(state["phase"])
-        page.wait_for_timeout(300)
+        still(page)
         assert violations(page) == [], state["phase"]
     stand_in.tell(WAITING)
     expect(page.locator("#phase")).to_have_text("waiting")
-    page.wait_for_timeout(300)
+    still(page)
     assert violations(page) == []
     page.evaluate("document.querySelector('main').insertAdjacentHTML('beforeend', '<img src=\"/static/icon.svg\">')")
     assert len(violations(page)) == 1, "an image without words is seen"

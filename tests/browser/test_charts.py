@@ -48,8 +48,7 @@ def test_what_swings_faster_than_there_are_pixels_is_drawn_from_its_least_to_its
     """Also beside a stretch without numbers, which stays empty."""
     rows = [NAN if 700 < i < 900 else 0.01 * (i % 2) for i in range(1601)]
     stand_in.show(positions(rows))
-    expect(page.locator("#position .legend button")).to_have_count(1)
-    page.wait_for_timeout(200)
+    stand_in.drawn()
     *swings, gap = seen(page, "position", [0.1, 0.3, 0.9, 0.5], "ink")
     assert gap is None
     for drawn in swings:

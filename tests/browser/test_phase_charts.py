@@ -5,7 +5,7 @@ import math
 import pytest
 from playwright.sync_api import expect
 
-from helpers.live.browser import seen
+from helpers.live.browser import seen, still
 from oracles.snapshots import contact, snapshot, table
 
 
@@ -28,8 +28,9 @@ def test_pressing_and_releasing_are_told_apart_anew_in_every_snapshot(stand_in, 
         force = [150 * d for d in depth]
         loop = table("loop", 0.0, 1e-3, ("penetration", "m", "", depth), ("force", "N", "", force))
         stand_in.show(snapshot(0.0, 0.2, {**loop, "stiffness": None}))
+        stand_in.drawn()
         expect(page.locator("#loop .legend button")).to_have_count(2)
-        page.wait_for_timeout(200)
+        still(page)
         parts = [0.4 + 0.01 * i for i in range(20)]
         assert any(seen(page, "loop", parts, colour)), colour
         assert not any(seen(page, "loop", parts, other)), colour
@@ -46,7 +47,9 @@ def test_the_ideal_spring_is_as_steep_as_the_wall(stand_in, page):
     def height(stiffness):
         """Where the dashed line is, near the deepest point, when the loop itself is hidden."""
         stand_in.show(spring(stiffness))
+        stand_in.drawn()
         expect(page.locator("#loop .legend button")).to_have_count(3)
+        still(page)
         parts = [0.84 + 0.005 * i for i in range(9)]
         found = [place for place in seen(page, "loop", parts, "ink") if place]
         assert found
@@ -59,6 +62,4 @@ def test_the_ideal_spring_is_as_steep_as_the_wall(stand_in, page):
     settled_at = page.locator("#loop .legend button[aria-pressed=false]")
     expect(settled_at).to_have_count(2)
     assert steep < 0.25
-    stand_in.show(spring(75.0))
-    page.wait_for_timeout(200)
     assert height(75.0) > steep + 0.3

@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
-from helpers.live.browser import DESK, PHONE
+from helpers.live.browser import DESK, PHONE, still
 from helpers.live.launched import first_and_slowly
 from helpers.live.stand_in import ENDED, RUNNING, RUNS
 from oracles.snapshots import contact
@@ -78,8 +78,9 @@ def shown(stand_in, open_page, viewport, scheme, **options):
     stand_in.tell({"type": "events", "events": EVENTS}, RUNS)
     stand_in.show(contact())
     page = open_page(stand_in.url, viewport=viewport, color_scheme=scheme, **options)
+    stand_in.drawn()
     expect(page.locator("#force .legend")).to_contain_text("total")
-    page.wait_for_timeout(200)
+    still(page)
     return page
 
 
@@ -177,8 +178,7 @@ def test_light_and_dark_change_places_while_the_page_is_open(stand_in, open_page
     }"""
     assert page.evaluate(brightness) == "dark lines"
     page.emulate_media(color_scheme="dark")
-    page.wait_for_timeout(200)
-    assert page.evaluate(brightness) == "light lines"
+    page.wait_for_function(f"({brightness})() === 'light lines'")
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import pytest
 from playwright.sync_api import expect
 
 from helpers.live.browser import order
+from helpers.live.launched import wait_for
 from helpers.live.stand_in import OPTIONS, RUNNING, TOKEN
 from oracles.snapshots import contact
 
@@ -167,23 +168,22 @@ def test_spans_freezing_and_scrolling_ask_for_that_stretch_of_time(stand_in, pag
     stand_in.show(contact(1.0, 3.0))
     expect(page.locator("#force .legend")).to_contain_text("total")
 
-    def asked(act):
+    def asks(act, *stretch):
         before = len(stand_in.watches())
         act()
-        page.wait_for_timeout(100)
-        watches = stand_in.watches()[before:]
-        return [(watch["span_s"], watch["end_s"]) for watch in watches]
+        later = lambda: [(watch["span_s"], watch["end_s"]) for watch in stand_in.watches()[before:]]  # noqa: E731
+        wait_for(f"the question for {stretch}", lambda: stretch in later())
 
     stand_in.state(tick=3000, end_tick=60000)
-    page.wait_for_timeout(100)
-    assert asked(lambda: page.keyboard.press("]")) == [(10, None)]
-    assert asked(lambda: page.click("label:has([name=span][value='2'])")) == [(2, None)]
+    expect(page.locator("#time")).to_have_text("3.000 of 60 s")
+    asks(lambda: page.keyboard.press("]"), 10, None)
+    asks(lambda: page.click("label:has([name=span][value='2'])"), 2, None)
     page.click("h1")
-    assert asked(lambda: page.keyboard.press("f")) == [(2, 3)]
-    assert asked(lambda: page.keyboard.press("ArrowLeft")) == [(2, 2)]
-    assert asked(lambda: page.click("#earlier")) == [(2, 2)]
-    assert asked(lambda: page.click("#freeze")) == [(2, None)]
-    assert asked(lambda: page.click("label:has([name=span][value='all'])")) == [(None, None)]
+    asks(lambda: page.keyboard.press("f"), 2, 3)
+    asks(lambda: page.keyboard.press("ArrowLeft"), 2, 2)
+    asks(lambda: page.click("#earlier"), 2, 2)
+    asks(lambda: page.click("#freeze"), 2, None)
+    asks(lambda: page.click("label:has([name=span][value='all'])"), None, None)
     assert RUNNING["first_s"] == 0.0
 
 
@@ -198,7 +198,8 @@ def test_a_link_of_an_earlier_server_is_told_apart(stand_in, page):
 def test_three_clicks_are_one_swap(stand_in, page):
     stand_in.answer = lambda command: None
     page.locator("#swap-do").evaluate("button => { for (let i = 0; i < 3; i++) button.click(); }")
-    page.wait_for_timeout(200)
+    page.keyboard.press("[")
+    stand_in.asked(lambda watch: watch["span_s"] == 1)  # it comes after all that was ordered
     assert len(stand_in.commands()) == 1
     expect(page.locator("#swap-do")).to_be_disabled()
 

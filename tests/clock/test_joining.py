@@ -41,9 +41,9 @@ class Served:
         """What comes back to somebody new."""
         with Stranger(self.context, self.sockets / "clock.sock") as stranger:
             stranger.socket.send(frame)
-            self.server.socket.poll(10_000)
+            self.server.socket.poll(60_000)
             self.server.serve()
-            assert stranger.socket.poll(10_000)
+            assert stranger.socket.poll(60_000)
             return msgpack.unpackb(stranger.socket.recv())[1:]
 
     def close(self) -> None:
@@ -77,7 +77,7 @@ def test_a_process_that_does_not_say_what_it_is_may_take_part(role: str, program
     brought = dict.fromkeys(PROCESSES[role].binds, "ipc://x")
     with Stranger(served.context, served.sockets / "clock.sock") as stranger:
         stranger.socket.send(pack(1, JOIN, role, SECRET, 1, brought, True, *program))
-        served.server.socket.poll(10_000)
+        served.server.socket.poll(60_000)
         served.server.serve()
         node = served.server.roster.own(role)
     assert node
@@ -97,7 +97,7 @@ def test_one_command_is_carried_out_between_two_grants_however_many_wait(served:
             stranger.socket.send(pack(1, COMMAND, str(number), {}))
         done = []
         while len(served.asked) < 5:
-            assert served.server.socket.poll(10_000)
+            assert served.server.socket.poll(60_000)
             before = len(served.asked)
             served.server.serve()
             done.append(len(served.asked) - before)
@@ -116,13 +116,13 @@ def test_a_frame_that_takes_long_to_read_is_refused_unread(served: Served) -> No
 def test_a_message_of_very_many_frames_is_taken_over_several_turns_with_grants_between(served: Served) -> None:
     with Stranger(served.context, served.sockets / "clock.sock") as stranger:
         stranger.socket.send_multipart([b""] * 999 + [pack(1, COMMAND, "pause", {})])
-        assert served.server.socket.poll(10_000)
+        assert served.server.socket.poll(60_000)
         turns = 0
         while not served.asked:
             served.server.serve()
             turns += 1
         assert turns == 5
-        assert stranger.socket.poll(10_000)
+        assert stranger.socket.poll(60_000)
         assert msgpack.unpackb(stranger.socket.recv())[1:3] == [REPLY, True]
 
 

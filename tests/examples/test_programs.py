@@ -20,7 +20,7 @@ from haploop.launch.runs.replay import replay
 from haploop.launch.scene.file import load
 from haploop.logger.log.recording import Recording
 from helpers.live import attacks
-from helpers.live.launched import SCENES, Run, alive, wait_for
+from helpers.live.launched import BRIEF, PATIENCE_S, SCENES, Run, alive, wait_for
 from helpers.live.programs import compiled, in_node, program, seat
 
 pytestmark = pytest.mark.slow
@@ -29,7 +29,8 @@ CONTROLLERS = [("controller.js", "fig6b.toml"), ("wall.c", "fig6a.toml")]
 SEATS = [("controller", *controller) for controller in CONTROLLERS] + [("plant", "plant.js", "fig6b.toml")]
 PAGE = Path(__file__).parents[2] / "protocol/README.md"
 FREE = ("--pace", "free")
-PATIENT = "run.deadline=30"
+# It stands still until whoever is to be there is there.
+STANDS = "event=[{at=0.5, pause=true}]"
 Start = Callable[..., Run]
 
 
@@ -87,7 +88,7 @@ def test_the_protocols_page_names_what_a_program_is_told_at_its_start_and_nothin
 def test_a_controller_of_another_language_gives_every_column_of_our_own_to_the_bit(
     name: str, scene: str, tmp_path: Path, running: Start
 ) -> None:
-    run = running(*seat("controller", program(name, tmp_path)), scene=SCENES / scene, sets=(PATIENT,), pace=FREE)
+    run = running(*seat("controller", program(name, tmp_path)), scene=SCENES / scene, sets=(), pace=FREE)
     programs = run.summary()["programs"]
     assert (programs["controller"]["name"], programs["controller"]["own"]) == (name, False)
     assert programs["plant"]["own"]
@@ -102,7 +103,7 @@ def test_a_controller_of_another_language_carries_out_what_is_set_at_the_tick_th
     changes = '[{at = 1.0, set = {"wall.stiffness" = 120.0, "clock.round_trip_delay" = 0.0035}},'
     changes += '{at = 1.5, set = {"wall.position" = -0.0601}}]'
     words = seat("controller", program(name, tmp_path))
-    run = running(*words, scene=SCENES / scene, sets=(f"event={changes}", PATIENT), pace=FREE)
+    run = running(*words, scene=SCENES / scene, sets=(f"event={changes}",), pace=FREE)
     run.end(0)
     assert_same(haploop.logger.read(run.out_directory), own(tmp_path, scene, f"event={changes}"))
 
@@ -112,7 +113,7 @@ def test_a_swap_that_a_controller_cannot_make_stands_in_the_log_as_refused_and_c
     name: str, scene: str, tmp_path: Path, running: Start
 ) -> None:
     swap = 'event=[{at = 1.5, swap = {kind = "damping", damping = 5.0}}]'
-    run = running(*seat("controller", program(name, tmp_path)), scene=SCENES / scene, sets=(swap, PATIENT), pace=FREE)
+    run = running(*seat("controller", program(name, tmp_path)), scene=SCENES / scene, sets=(swap,), pace=FREE)
     run.end(0)
     log = haploop.logger.read(run.out_directory)
     (refused,) = [event for event in log["/events"] if "refused" in event]
@@ -125,7 +126,7 @@ def test_a_swap_that_a_controller_cannot_make_stands_in_the_log_as_refused_and_c
 def test_a_plant_of_another_language_moves_as_the_exact_flow_and_the_books_find_no_energy_of_its_own(
     tmp_path: Path, running: Start
 ) -> None:
-    run = running(*seat("plant", in_node("plant.js")), scene=SCENES / "fig6b.toml", sets=(PATIENT,), pace=FREE)
+    run = running(*seat("plant", in_node("plant.js")), scene=SCENES / "fig6b.toml", sets=(), pace=FREE)
     summary = run.summary()
     log, truth = haploop.logger.read(run.out_directory), own(tmp_path, "fig6b.toml")
     assert np.abs(log["/plant"]["x"] - truth["/plant"]["x"]).max() < 1e-13
@@ -136,7 +137,7 @@ def test_a_plant_of_another_language_moves_as_the_exact_flow_and_the_books_find_
 def test_a_plant_that_diverges_ends_the_run_at_the_tick_at_which_our_own_does(tmp_path: Path, running: Start) -> None:
     wild = ("dissipation.0.damping=60", "diverged_beyond=0.07")
     words = seat("plant", in_node("plant.js"))
-    summary = running(*words, scene=SCENES / "fig6b.toml", sets=(*wild, PATIENT), pace=FREE).summary()
+    summary = running(*words, scene=SCENES / "fig6b.toml", sets=wild, pace=FREE).summary()
     assert summary["ended"] == "diverged"
     assert "beyond the limit of 0.07 m" in summary["why"]
     assert summary["ticks"] == len(own(tmp_path, "fig6b.toml", *wild)["/controller"]["x"])
@@ -148,7 +149,7 @@ def test_a_program_joins_a_run_that_waits_for_it_and_neither_outlives_the_other(
     role: str, name: str, scene: str, how: str, tmp_path: Path, running: Start
 ) -> None:
     words = program(name, tmp_path)
-    sets = (PATIENT,) if how == "to its end" else (PATIENT, "duration=600")
+    sets = () if how == "to its end" else ("duration=600",)
     run = running("--external", role, scene=SCENES / scene, sets=sets, pace=FREE)
     file = awaited(run, role)
     assert file.stat().st_mode & 0o777 == 0o600
@@ -156,7 +157,7 @@ def test_a_program_joins_a_run_that_waits_for_it_and_neither_outlives_the_other(
         try:
             if how == "to its end":
                 assert run.summary()["programs"][role]["name"] == name
-                assert joined.wait(30) == 0
+                assert joined.wait(PATIENCE_S) == 0
                 return
             run.reaches(100)
             if how == "killed":
@@ -166,7 +167,7 @@ def test_a_program_joins_a_run_that_waits_for_it_and_neither_outlives_the_other(
             else:
                 run.signal(signal.SIGKILL)
                 run.end(-signal.SIGKILL)
-                assert joined.wait(30) == 1
+                assert joined.wait(PATIENCE_S) == 1
         finally:
             joined.kill()
 
@@ -176,8 +177,8 @@ def test_a_program_joins_a_run_that_waits_for_it_and_neither_outlives_the_other(
 def test_a_program_that_is_killed_or_hangs_ends_the_run_by_name_and_leaves_nothing(
     number: signal.Signals, role: str, name: str, scene: str, tmp_path: Path, running: Start
 ) -> None:
-    deadline = "run.deadline=3" if number == signal.SIGSTOP else PATIENT
-    run = running(*seat(role, program(name, tmp_path)), scene=SCENES / scene, sets=("duration=600", deadline))
+    deadline = (BRIEF,) if number == signal.SIGSTOP else ()
+    run = running(*seat(role, program(name, tmp_path)), scene=SCENES / scene, sets=("duration=600", *deadline))
     run.reaches(100)
     run.send(role, number)
     run.end(1)
@@ -189,7 +190,7 @@ def test_a_program_that_is_killed_or_hangs_ends_the_run_by_name_and_leaves_nothi
 
 @pytest.mark.parametrize(("role", "name", "scene"), SEATS)
 def test_a_program_ends_with_the_launcher(role: str, name: str, scene: str, tmp_path: Path, running: Start) -> None:
-    run = running(*seat(role, program(name, tmp_path)), scene=SCENES / scene, sets=("duration=600", PATIENT))
+    run = running(*seat(role, program(name, tmp_path)), scene=SCENES / scene, sets=("duration=600",))
     run.reaches(100)
     run.signal(signal.SIGKILL)
     wait_for("the end of the nodes", lambda: not alive(list(run.nodes.values())))
@@ -200,15 +201,16 @@ def test_what_strangers_send_changes_no_bit_of_a_run_with_a_program_of_another_l
     role: str, name: str, scene: str, tmp_path: Path, running: Start
 ) -> None:
     words = seat(role, program(name, tmp_path))
-    undisturbed = running(*words, scene=SCENES / scene, sets=(PATIENT,), pace=FREE).summary()
-    run = running(*words, scene=SCENES / scene, sets=(PATIENT,), pace=("--pace", "1"))
-    run.reaches(100)
+    undisturbed = running(*words, scene=SCENES / scene, sets=(), pace=FREE).summary()
+    run = running(*words, scene=SCENES / scene, sets=(STANDS,), pace=FREE)
+    run.stands(500)
     flood = subprocess.Popen([sys.executable, attacks.__file__, str(sockets(run))], stdout=subprocess.PIPE)
     assert flood.stdout
     with flood.stdout:
         flood.stdout.readline()
         context = attacks.zmq.Context()
         senders = [each for file in sockets(run).glob("*.sock") for each in attacks.send_unasked(context, file)]
+        run.ask("resume")
         summary = run.summary()
         flood.kill()
         flood.wait()
@@ -228,22 +230,26 @@ def test_what_strangers_send_changes_no_bit_of_a_run_with_a_program_of_another_l
 def test_a_scene_that_asks_for_more_than_a_program_can_ends_the_run_with_its_sentence(
     role: str, name: str, scene: str, says: str, tmp_path: Path, running: Start
 ) -> None:
-    run = running(*seat(role, program(name, tmp_path)), scene=SCENES / scene, sets=(PATIENT,), pace=FREE)
+    run = running(*seat(role, program(name, tmp_path)), scene=SCENES / scene, sets=(), pace=FREE)
     run.end(1)
     assert says in run.stderr
 
 
 def test_the_observer_in_c_misses_nothing_changes_nothing_and_ends_with_the_run(tmp_path: Path, running: Start) -> None:
     observer = compiled("observer.c", tmp_path)
-    run = running(scene=SCENES / "fig6b.toml", sets=(PATIENT,), pace=("--pace", "2"))
-    run.reaches(1)
-    said = subprocess.run([*observer, str(sockets(run))], capture_output=True, text=True, timeout=60)
-    assert said.returncode == 0, said.stderr
+    run = running(scene=SCENES / "fig6b.toml", sets=(STANDS,), pace=FREE)
+    run.stands(500)
+    pipe = subprocess.PIPE
+    with subprocess.Popen([*observer, str(sockets(run))], stdout=pipe, stderr=pipe, text=True) as process:
+        wait_for("the observer", lambda: len(run.ask("status")["nodes"]) == 4)
+        run.ask("resume")
+        said, complaint = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0, complaint
     run.end(0)
     log, truth = haploop.logger.read(run.out_directory), own(tmp_path, "fig6b.toml")
     assert_same(log, truth)
     x, force = truth["/plant"]["x"], truth["/plant"]["force"]
-    attached, ended = said.stdout.splitlines()
+    attached, ended = said.splitlines()
     seen = slice(int(attached.split()[-1]) * 10, None)
     assert ended.startswith("to tick 3000: ")
     assert ended.endswith(" 0 ticks missed")
@@ -260,7 +266,7 @@ def test_the_observer_in_c_notices_that_the_launcher_was_killed(tmp_path: Path, 
         run.signal(signal.SIGKILL)
         run.end(-signal.SIGKILL)
         try:
-            assert process.wait(30) == 1
+            assert process.wait(PATIENCE_S) == 1
         finally:
             process.kill()
         assert process.stderr
@@ -273,7 +279,7 @@ def test_the_steering_client_says_what_became_of_a_command_and_exits_by_it(tmp_p
     client = [*in_node("steer.js"), str(sockets(run) / "run.json")]
 
     def say(*words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run([*client, *words], capture_output=True, text=True, timeout=30)
+        return subprocess.run([*client, *words], capture_output=True, text=True, timeout=PATIENCE_S)
 
     done = say("set", json.dumps({"set": {"wall.stiffness": 200}}))
     assert done.returncode == 0, done.stderr

@@ -11,7 +11,7 @@ from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.replay import ReplayError, replay
 from haploop.launch.scene.file import load
-from helpers.live.launched import SCENE, alive, first_and_slowly, wait_for
+from helpers.live.launched import BRIEF, BRIEF_S, SCENE, alive, first_and_slowly, wait_for
 
 KINDS = registry()
 # It stands still at tick 500, so that it is surely still there when something joins it.
@@ -135,14 +135,14 @@ def test_a_logger_that_is_killed_does_not_hold_the_run_up_until_the_deadline(run
 @pytest.mark.slow
 def test_a_logger_that_hangs_holds_the_run_up_until_the_deadline_and_is_then_dropped(running, attached, alone):
     """The run waits for it first: a lossless logger may be slow. Woken up, it says that the run went on without it."""
-    run = running(sets=(*SHORT, "run.deadline=0.8"))
+    run = running(sets=(*SHORT, BRIEF))
     run.reaches(500)
     second = attached(run)
     run.stands(at=run.ask("step", ticks=200)["tick"])
     second.signal(signal.SIGSTOP)
     run.ask("resume")
     assert run.summary()["trajectory_sha256"] == alone
-    assert second.stood_for(0.8)
+    assert second.stood_for(BRIEF_S)
     assert second.is_there()
     second.signal(signal.SIGCONT)
     second.end(1)

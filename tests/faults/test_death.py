@@ -9,7 +9,7 @@ import pytest
 import haploop.logger
 from haploop.launch.processes import run_directory
 from haploop.launch.runs.replay import replay
-from helpers.live.launched import LONG, ROLES, alive, first_and_slowly, same_bits, wait_for
+from helpers.live.launched import BRIEF, BRIEF_S, LONG, ROLES, alive, first_and_slowly, same_bits, wait_for
 
 NAMED = r"The {} was killed by SIGKILL; the last tick all nodes had done is (\d+) "
 
@@ -69,12 +69,12 @@ def test_a_node_killed_at_the_end_when_the_others_have_done_their_last_tick_is_n
 
 @pytest.mark.parametrize("role", first_and_slowly("logger", "controller", "plant"))
 def test_a_node_that_hangs_is_named_after_the_deadline_the_user_has_set(role, running, undisturbed):
-    run = running(sets=("duration=600", "run.deadline=0.7"))
+    run = running(sets=(*LONG, BRIEF))
     run.has_logged(200)
     run.send(role, signal.SIGSTOP)
     run.end(1)
     run.leaves_nothing()
-    assert f"The {role} has not answered for 0.7 s" in run.stderr
+    assert f"The {role} has not answered for {BRIEF_S} s" in run.stderr
     assert re.search(r"the last tick all nodes had done is \d+ ", run.stderr)
     assert "run.deadline" in run.stderr
     assert not Path("/proc/self/stat").exists() or "It is stopped, by a signal or a debugger." in run.stderr
@@ -123,10 +123,10 @@ def test_when_the_launcher_is_killed_as_the_nodes_start_they_end_by_themselves(r
 
 @pytest.mark.slow
 def test_a_launcher_that_was_stopped_for_longer_than_the_deadline_blames_nobody(running, undisturbed):
-    run = running(sets=("duration=600", "run.deadline=0.7"))
+    run = running(sets=(*LONG, BRIEF))
     done = run.reaches(200)
     run.signal(signal.SIGSTOP)
-    wait_for("three deadlines", lambda: run.stood_for(2.1))
+    wait_for("three deadlines", lambda: run.stood_for(3 * BRIEF_S))
     run.signal(signal.SIGCONT)
     run.reaches(done + 200)
     run.ask("stop")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
 import signal
 import stat
@@ -21,11 +22,24 @@ from haploop.launch.processes.foreign import Program, ProgramError, check_wait, 
 from haploop.launch.processes.run_directory import CommandRefused
 from haploop.logger import read
 from haploop.tools.cli.app import app
-from helpers.live.launched import SCENE, Launched, Run, alive, command, first_and_slowly, processes, same_bits, wait_for
+from helpers.live.launched import (
+    BRIEF,
+    BRIEF_S,
+    PATIENCE_S,
+    SCENE,
+    Launched,
+    Run,
+    alive,
+    command,
+    first_and_slowly,
+    processes,
+    same_bits,
+    wait_for,
+)
 
 CONTROLLER = Path(__file__).parents[1] / "oracles/plain_controller.py"
 PLAIN = shlex.join([sys.executable, "-I", str(CONTROLLER)])
-SOON = ("run.deadline=1",)
+SOON = (BRIEF,)
 Started = Callable[..., Run]
 
 
@@ -34,7 +48,7 @@ def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Started
     """Starts runs of figure 6(c) with the plain controller, and leaves none behind."""
     runs: list[Run] = []
 
-    def start(*options: str, node: str | None = PLAIN, sets: tuple[str, ...] = SOON, **more: Any) -> Run:
+    def start(*options: str, node: str | None = PLAIN, sets: tuple[str, ...] = (), **more: Any) -> Run:
         nodes = ("--node", f"controller={node}") if node else ()
         sets = ("duration=3", *sets)
         runs.append(Run(tmp_path / f"out{len(runs)}", *nodes, *options, sets=sets, **{"pace": (), **more}))
@@ -48,7 +62,7 @@ def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Started
 
 
 def test_a_foreign_controller_gives_the_bits_of_our_own_and_is_told_as_foreign(started: Started) -> None:
-    own, foreign = started(node=None), started(sets=("run.verdict=pushed", *SOON))
+    own, foreign = started(node=None), started(sets=("run.verdict=pushed",))
     theirs, ours = foreign.summary(), own.summary()
     assert theirs["trajectory_sha256"] == ours["trajectory_sha256"]
     log, truth = foreign.log(), own.log()
@@ -70,7 +84,7 @@ def test_a_foreign_controller_gives_the_bits_of_our_own_and_is_told_as_foreign(s
     [
         ("die", "was killed by SIGKILL; the last tick all nodes had done is"),
         pytest.param("exit", "ended with exit status 3; the last tick all nodes", marks=pytest.mark.slow),
-        pytest.param("hang", "has not answered for 1 s and was ended", marks=pytest.mark.slow),
+        pytest.param("hang", f"has not answered for {BRIEF_S} s and was ended", marks=pytest.mark.slow),
         pytest.param("silent", "no tick was done, though all nodes speak", marks=pytest.mark.slow),
         pytest.param("nan", "the controller gave a force that is no finite number", marks=pytest.mark.slow),
         pytest.param("text", "In the loop commands from tick", marks=pytest.mark.slow),
@@ -83,7 +97,7 @@ def test_a_foreign_controller_gives_the_bits_of_our_own_and_is_told_as_foreign(s
 def test_however_a_foreign_controller_fails_the_run_ends_names_it_and_keeps_its_log(
     how: str, words: str, started: Started
 ) -> None:
-    run = started(node=f"{PLAIN} --misbehave {how}")
+    run = started(node=f"{PLAIN} --misbehave {how}", sets=SOON)
     run.end(1)
     assert words in run.stderr
     assert "plain_controller.py" in run.stderr or how == "nan"
@@ -110,16 +124,18 @@ def test_a_program_that_ignores_every_end_and_its_children_end_with_the_run(
 ) -> None:
     """One of the children has a session of its own. The second interrupt ends at once, what never joined, too."""
     script = tmp_path / "stubborn.sh"
-    script.write_text("trap '' TERM INT HUP\nsetsid sleep 977 &\nsleep 978\n")
+    first, second = (f"sleep {1000 + os.getpid()}.{n}" for n in (1, 2))  # nobody else's
+    script.write_text(f"trap '' TERM INT HUP\nsetsid {first} &\n{second}\n")
     run = started(node=f"sh {script}", sets=())
 
     def asleep() -> list[int]:
-        return [pid for pid, _, _, words in processes() if words in ("sleep 977", "sleep 978")]
+        return [pid for pid, _, _, words in processes() if words in (first, second)]
 
     wait_for("both sleepers", lambda: len(asleep()) == 2)
-    for number in numbers:
+    for number in numbers[:-1]:
         run.signal(number)
-        wait_for("time to heed it", lambda: run.stood_for(0.3))
+        assert run.ask("status"), "it has heeded the first"
+    run.signal(numbers[-1])
     wait_for("their end", lambda: not asleep())
     run.end(-signal.SIGKILL if numbers == [signal.SIGKILL] else 1)
 
@@ -195,7 +211,7 @@ def test_a_run_waits_for_an_external_controller_and_gives_the_same_bits(started:
     controller = joined(seat, "--nameless")
     assert run.summary()["trajectory_sha256"] == own.summary()["trajectory_sha256"]
     assert run.summary()["programs"]["controller"] == {"name": "", "version": "", "command": "", "own": False}
-    assert controller.wait(30) == 0
+    assert controller.wait(PATIENCE_S) == 0
     assert not seat.exists()
     assert read(run.out_directory).attachments.keys() == {"scene.toml", "programs.json"}
     run.leaves_nothing()
@@ -203,11 +219,11 @@ def test_a_run_waits_for_an_external_controller_and_gives_the_same_bits(started:
 
 @pytest.mark.slow
 def test_an_external_controller_that_dies_is_noticed_at_once(started: Started) -> None:
-    run = started("--external", "controller", node=None, sets=("run.deadline=30",))
+    run = started("--external", "controller", node=None)
     controller = joined(seat_of(run), "--misbehave", "die")
     run.end(1)
     assert "The controller (external) is gone; the last tick all nodes had done is" in run.stderr
-    assert controller.wait(30) == -signal.SIGKILL
+    assert controller.wait(PATIENCE_S) == -signal.SIGKILL
 
 
 @pytest.mark.slow
@@ -217,7 +233,7 @@ def test_of_two_programs_for_one_role_the_second_is_turned_away(started: Started
     first = joined(seat)
     wait_for("the first", lambda: any(node["role"] == "controller" for node in run.ask("status")["nodes"]))
     second = joined(seat)
-    assert second.wait(30) == 1
+    assert second.wait(PATIENCE_S) == 1
     assert run.ask("status")["refused"] == {"controller": "The role controller is taken."}
     run.signal(signal.SIGINT)
     run.end(1)

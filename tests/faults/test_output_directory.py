@@ -14,7 +14,7 @@ from haploop.launch.runs.start import prepare
 from haploop.launch.spec import OutputError, make_output
 from haploop.tools.sweep.store import Store
 from haploop.tools.sweep.table import make_schema
-from helpers.live.launched import HAPLOOP, SCENE, command, first_and_slowly
+from helpers.live.launched import HAPLOOP, PATIENCE_S, SCENE, command, first_and_slowly
 
 # Round after round, processes that stand at a barrier make the directory at the same instant; prints what each got.
 CROWD = """
@@ -48,6 +48,17 @@ for turn in range(rounds):
         os.close(end)
 """
 ROUNDS, SIZE = 60, 8
+# haploop, which prints an empty line as soon as it heeds signals.
+BEGIN = """
+from haploop.tools.cli.main import LeavingAtOnce, main
+kept = LeavingAtOnce.__enter__
+def enter(self):
+    kept(self)
+    LeavingAtOnce.__enter__ = kept
+    print(flush=True)
+LeavingAtOnce.__enter__ = enter
+main()
+"""
 
 
 def crowd(cwd: Path, out: str, there: bool = False) -> list[list[str]]:
@@ -124,12 +135,11 @@ def test_a_run_whose_sockets_cannot_be_made_leaves_no_directory(live_runs_here, 
 @pytest.mark.parametrize("after_s", first_and_slowly(0.3, 0.02, 0.06, 0.1, 0.15, 0.2, 0.4, 0.5))
 @pytest.mark.parametrize("number", first_and_slowly(signal.SIGTERM, signal.SIGINT))
 def test_a_signal_in_the_first_half_second_is_never_a_traceback_and_leaves_nothing_half_made(after_s, number, tmp_path):
-    """Until the first line of haploop has run, the words are Python's; from there on they are haploop's."""
+    """Until haploop heeds signals, the words are Python's; from there on they are haploop's."""
     out = tmp_path / "out"
-    begin = "from haploop.tools.cli.main import main; print(flush=True); main()"
     words = ["run", str(SCENE), "--set", "duration=600", "--json", "--out", str(out)]
     run = subprocess.Popen(
-        [sys.executable, "-c", begin, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", BEGIN, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert run.stdout
     run.stdout.readline()
@@ -137,7 +147,7 @@ def test_a_signal_in_the_first_half_second_is_never_a_traceback_and_leaves_nothi
         run.wait(timeout=after_s)
     except subprocess.TimeoutExpired:
         run.send_signal(number)
-    said, complaints = run.communicate(timeout=40)
+    said, complaints = run.communicate(timeout=PATIENCE_S)
     assert "Traceback" not in complaints
     if said:
         assert json.loads(said)["ended"] == "stopped"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import signal
 import threading
+from functools import partial
 from typing import Self
 
 import numpy as np
@@ -16,7 +17,7 @@ from haploop.logger.log.recording import Recording
 from haploop.tools.attach import plotjuggler
 from haploop.tools.attach.plotjuggler import Outlet, publish
 from helpers.live.in_process import ask
-from helpers.live.launched import first_and_slowly, wait_for
+from helpers.live.launched import PATIENCE_S, first_and_slowly, wait_for
 from helpers.live.live_run import Going, going, undisturbed
 from oracles.plotjuggler_rules import Viewer
 
@@ -51,7 +52,7 @@ class Node:
 
     def finish(self) -> None:
         """Wait until it has seen the run end, and mark the end of what it said."""
-        self._thread.join(60)
+        self._thread.join(PATIENCE_S)
         assert not self._thread.is_alive(), "the node does not notice the end of the run"
         self.outlet.send(END, b"\x90")
 
@@ -59,7 +60,7 @@ class Node:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._thread.join(60)
+        self._thread.join(PATIENCE_S)
         self.outlet.close()
 
 
@@ -98,13 +99,15 @@ def test_every_sample_of_a_run_reaches_plotjuggler_bit_for_bit(pace, tmp_path, c
 
 @pytest.mark.slow
 def test_a_viewer_that_comes_late_gets_everything_from_there_on(tmp_path):
-    with going(tmp_path, "duration=1.2", pauses=(5,), pace=1.0) as subject:
+    with going(tmp_path, "duration=1.2", pauses=(5, 300), pace=1.0) as subject:
         subject.stands_at(5)
         with Node(subject.live) as node:
             node.joined(subject, 5)
             subject.ask("resume")
-            wait_for("tick 300", lambda: subject.ask("status")[1]["tick"] >= 300)
+            subject.stands_at(300)
             with Viewer(node.outlet.address) as viewer:
+                node.heard()
+                subject.ask("resume")
                 subject.result()
                 node.finish()
                 viewer.read_to(END)
@@ -128,7 +131,7 @@ def test_a_viewer_that_does_not_read_costs_the_run_nothing_and_the_node_skips_no
             subject.ask("resume")
             summary = subject.result()
             node.finish()
-            while viewer.read(300):
+            while viewer.read(2000):
                 pass
     assert summary["trajectory_sha256"] == undisturbed(subject.prepared)["trajectory_sha256"]
     assert summary["lost"]["telemetry_gaps"] == 0
@@ -143,6 +146,10 @@ def attached(launched, *arguments):
     return node, re.findall(r"tcp://127\.0\.0\.1:\d+", node.stderr)[0]
 
 
+def has_joined(run):
+    return [node for node in run.ask("status")["nodes"] if node["role"] == "plotjuggler" and node["tick"]]
+
+
 @pytest.mark.slow
 def test_it_waits_for_a_run_survives_its_end_and_goes_on_with_the_next(running, launched):
     """The times of the second run begin at 0 again, as its own do."""
@@ -150,14 +157,17 @@ def test_it_waits_for_a_run_survives_its_end_and_goes_on_with_the_next(running, 
     with Viewer(address) as viewer:
         for _ in range(2):
             viewer.parsers.clear()
-            run = running(sets=("duration=0.4",), pace=("--pace", "1"))
+            run = running(sets=("duration=0.4", "event=[{at=0.1, pause=true}]"), pace=("--pace", "1"))
             run_id = run.live.id
+            node.says(f"run {run_id}: ")
+            run.stands(100)
+            wait_for("the node", partial(has_joined, run))
+            run.ask("resume")
             run.summary()
             node.says(f"run {run_id} is over")
-            while viewer.read(300):
-                pass
+            while "/plant" not in viewer.parsers or viewer.parsers["/plant"].column("timestamp")[-1] < 0.4:
+                assert viewer.read(20_000), "the last sample does not come"
             stamps = viewer.parsers["/plant"].column("timestamp")
-            assert stamps[0] < 0.3
             assert np.array_equal(stamps, np.arange(round(stamps[0] * 10_000), 4001) / 10_000)
     node.signal(signal.SIGINT)
     node.end(0)
@@ -182,7 +192,7 @@ def test_stopped_for_long_it_costs_the_run_nothing_and_is_told_what_it_missed(ru
     run = running(sets=("duration=12", "run.block_ticks=10", "event=[{at=0.5, pause=true}]"), pace=())
     run.reaches(500)
     node, _ = attached(launched, "--run", run.live.id)
-    wait_for("the node", lambda: [n for n in run.ask("status")["nodes"] if n["role"] == "plotjuggler" and n["tick"]])
+    wait_for("the node", partial(has_joined, run))
     node.signal(signal.SIGSTOP)
     run.ask("resume")
     summary = run.summary()

@@ -12,7 +12,7 @@ from haploop.controller.dissipation import ElementError, PluginError
 from haploop.controller.dissipation.registry import load_source
 from haploop.launch.processes.plugin_trial import PluginTrial
 from haploop.protocol.scene.scene import ElementTable
-from helpers.live.launched import alive, command, first_and_slowly, processes, wait_for
+from helpers.live.launched import command, first_and_slowly, processes_of, wait_for
 from helpers.scenes.brake import source
 
 NEVER = "while True: pass"
@@ -30,11 +30,11 @@ BREAKS = {
     "for fd in range(3, 20): exec('try: os.write(fd, b\"nonsense\\\\n\")\\nexcept OSError: pass')": "answered for",
     "for fd in range(3, 20): exec('try: os.write(fd, b\"[3]\\\\n\")\\nexcept OSError: pass')": "answered for",
     "hoard = bytearray(1 << 36)": "MemoryError",
+    "sys.stdin.read() or input()": "EOFError",
 }
 HANGS = {
     NEVER: "1 s were not enough as",
     "time.sleep(1000)": "1 s were not enough as",
-    "sys.stdin.read() or input()": "EOFError",
     "subprocess.run(['sleep', '1000'])": "1 s were not enough as",
 }
 BRAKE = ElementTable(name="brake", parameters={"damping": 0.05})
@@ -77,14 +77,10 @@ for fd in range(3, 20):
 
 @pytest.mark.parametrize("place", first_and_slowly("at_import", "at_making", "at_force"))
 @pytest.mark.parametrize(("statement", "words"), first_and_slowly(*HANGS.items()))
-def test_a_file_that_does_not_come_to_an_end_is_given_up_and_leaves_no_process(statement, words, place):
-    before = {pid for pid, *_ in processes()}
+def test_a_file_that_does_not_come_to_an_end_is_given_up_and_leaves_no_process(statement, words, place, live_runs_here):
     with pytest.raises((PluginError, ElementError), match=words):
         tried(source(**{place: statement}), limit_s=1.0)
-    left = [
-        pid for pid, _, _, words in processes() if pid not in before and ("trial" in words or "sleep 1000" in words)
-    ]
-    wait_for("the end of what it started", lambda: not alive(left))
+    wait_for("the end of what it started", lambda: not processes_of(live_runs_here))
 
 
 def test_the_declaration_of_an_element_is_known_without_its_code():

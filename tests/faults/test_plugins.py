@@ -11,7 +11,7 @@ import pytest
 import haploop.logger
 from haploop.launch.processes import run_directory
 from haploop.launch.runs.replay import replay
-from helpers.live.launched import ROLES, SCENES, alive, command, first_and_slowly, wait_for
+from helpers.live.launched import BRIEF, BRIEF_S, ROLES, SCENES, alive, command, first_and_slowly, pending, wait_for
 
 HEAD = """
 import math, os, sys
@@ -130,7 +130,7 @@ HANGS = first_and_slowly(
 @pytest.mark.parametrize("hang", HANGS)
 def test_a_force_that_never_returns_is_named_with_element_tick_and_line_after_the_deadline(hang, running, brake):
     """At a pace: then all nodes have reported a tick before, and the deadline is that of a loop that runs."""
-    run = started(running, brake, "import threading, time\n" + ELEMENT.format(at_150=hang), sets=("run.deadline=0.7",))
+    run = started(running, brake, "import threading, time\n" + ELEMENT.format(at_150=hang), sets=(BRIEF,))
     run.end(1)
     run.leaves_nothing()
     assert "Element 0 (brake) gave no force at tick 150: DeadlineOver: it did not come to an end before" in run.stderr
@@ -161,10 +161,10 @@ def test_of_a_force_that_never_returns_from_compiled_code_node_line_and_deadline
     Once all have loaded, the deadline of a loop that runs holds for the controller, before any tick is reported, too.
     """
     hangs = ELEMENT.format(at_150="any(itertools.repeat(0))").replace("== 150", "== 5")
-    run = started(running, brake, "import itertools\n" + hangs, sets=("run.deadline=0.7",), pace=())
+    run = started(running, brake, "import itertools\n" + hangs, sets=(BRIEF,), pace=())
     run.end(1)
     run.leaves_nothing()
-    assert "The controller has not answered for 0.7 s" in run.stderr
+    assert f"The controller has not answered for {BRIEF_S} s" in run.stderr
     assert json.loads((run.out / "summary.json").read_text())["verdict"] == "undecided"
     assert re.search(r'File ".*/plugins/brake-.*", line \d+ in force', run.stderr)
 
@@ -191,7 +191,7 @@ def test_a_force_that_never_returns_in_one_process_is_ended_by_the_second_interr
     run = launched("run", str(made["scene"]), *options, out=tmp_path / "out")
     wait_for("tick 150", (tmp_path / "here").exists)
     run.signal(signal.SIGINT)
-    wait_for("a moment", lambda: run.stood_for(0.3))
+    wait_for("the first to be heeded", lambda: not pending(run.pid) and run.stood_for(0.3))
     run.signal(signal.SIGINT)
     run.end(1)
     assert "Interrupted at once" in run.stderr

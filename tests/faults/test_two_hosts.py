@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from haploop.protocol.transport.keys import make_keys
-from helpers.live.launched import HAPLOOP, PATIENCE_S, SCENE, alive, wait_for
+from helpers.live.launched import HAPLOOP, PATIENCE_S, PATIENT, SCENE, alive, wait_for
 from helpers.live.two_hosts import A6, A, Wire, on, two_hosts, why_not
 
 pytestmark = pytest.mark.slow
@@ -42,7 +42,7 @@ class Hosts:
 
     def run(self, *words: str, sets: tuple[str, ...] = ()) -> subprocess.Popen[str]:
         """Begins a run on host a."""
-        settings = [word for assignment in ("run.verdict=window", *sets) for word in ("--set", assignment)]
+        settings = [word for assignment in ("run.verdict=window", PATIENT, *sets) for word in ("--set", assignment)]
         out = ("--out", str(self.directory / "out"), "--json")
         return self.begin("a", *HAPLOOP, "run", str(SCENE), *settings, *self._tcp, *out, *words)
 
@@ -77,7 +77,7 @@ def bits_of(*sets: str, directory: Path, event: str = "") -> str:
     """The trajectory hash of the same scene in one process."""
     scene = directory / "alone.toml"
     scene.write_text(f'extends = "{SCENE}"\n{event}\n')
-    settings = [word for assignment in ("run.verdict=window", *sets) for word in ("--set", assignment)]
+    settings = [word for assignment in ("run.verdict=window", PATIENT, *sets) for word in ("--set", assignment)]
     words = [*HAPLOOP, "run", str(scene), *settings, "--in-process", "--json", "--out", str(directory / "alone")]
     return json.loads(subprocess.run(words, capture_output=True, check=True).stdout)["trajectory_sha256"]
 
@@ -107,7 +107,7 @@ def test_half_of_the_loop_on_another_host_gives_the_same_bits_behind_delay_and_l
 
 @pytest.mark.parametrize("role", ["controller", "plant"])
 def test_a_network_that_is_cut_for_good_ends_the_run_on_both_sides_and_leaves_nothing(hosts, role, live_runs_here):
-    run = hosts.run("--external", role, "--pace", "1", sets=("duration=600", "run.deadline=2"))
+    run = hosts.run("--external", role, "--pace", "1", sets=("duration=600", "run.deadline=5"))
     node = join_from(hosts, role, live_runs_here)
     wait_for("the run to go on", lambda: "3.0" in hosts.command("status", "--json").stdout or hosts.answers())
     hosts.wire.is_cut = True

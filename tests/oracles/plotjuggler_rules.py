@@ -85,7 +85,7 @@ class Viewer:
     def read_to(self, topic: str) -> None:
         """Read until a message of this topic comes."""
         while True:
-            came = self.read(20_000)
+            came = self.read(120_000)
             assert came is not None, f"nothing more came, not even {topic}"
             if came == topic:
                 return

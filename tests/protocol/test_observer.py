@@ -1,13 +1,12 @@
 """A lossy node hears everything it keeps up with, knows what it missed, and never costs the loop anything."""
 
-import time
-
 import numpy as np
 import pytest
 
 from haploop.logger import read
 from haploop.protocol.transport.clock_client import ClockClient
 from haploop.protocol.transport.observer import Observer
+from helpers.live.launched import wait_for
 from helpers.live.live_run import going, undisturbed
 
 ALL = ("plant", "controller", "logger")
@@ -30,6 +29,11 @@ def join_blocks(frames, name, column, steps=1):
             block = frame.as_dict()
             parts.append(np.frombuffer(block["columns"][column], "<f8")[: block["ticks"] * steps])
     return np.concatenate(parts)
+
+
+def views(subject):
+    """What the clock knows of the viewers."""
+    return [node for node in subject.ask("status")[1]["nodes"] if node["role"] == "view"]
 
 
 def test_an_observer_hears_every_tick_of_all_three_streams_and_every_event_at_its_tick(tmp_path):
@@ -91,22 +95,16 @@ def test_status_shows_an_observer_with_its_tick_its_lag_and_what_it_skipped(tmp_
         context = subject.live.make_context()
         observer = Observer(context, "view", subject.live.clock, ALL)
         try:
-            rows = []
-            for _ in range(100):
+
+            def rows(tick=300):
                 observer.wait(50)
                 observer.poll()
-                rows = [node for node in subject.ask("status")[1]["nodes"] if node["role"] == "view"]
-                if rows and rows[0]["tick"] == 300:
-                    break
-            assert rows[0]["skipped_ticks"] == 0
-            assert rows[0]["behind_ticks"] == 0
-            assert not rows[0]["lossless"]
+                return [node for node in views(subject) if node["tick"] == tick]
+
+            [row] = wait_for("the observer at tick 300", rows)
+            assert (row["skipped_ticks"], row["behind_ticks"], row["lossless"]) == (0, 0, False)
             observer.leave()
-            for _ in range(100):
-                if not [node for node in subject.ask("status")[1]["nodes"] if node["role"] == "view"]:
-                    break
-                time.sleep(0.02)
-            assert "view" not in {node["role"] for node in subject.ask("status")[1]["nodes"]}
+            wait_for("its leaving", lambda: not views(subject))
         finally:
             context.destroy(linger=0)
         subject.ask("stop")
@@ -121,21 +119,21 @@ def test_one_the_clock_has_dropped_joins_again_by_itself_and_hears_each_event_on
         observer = Observer(context, "view", subject.live.clock, ALL)
         try:
             events = []
-            for _ in range(20):
+
+            def hears(verbs):
                 observer.wait(50)
                 observer.poll()
-                events += observer.take_events()
+                events.extend(next(key for key in event if key != "at") for _, event in observer.take_events())
+                return events == verbs and len(views(subject)) == 1
+
+            wait_for("the first event", lambda: hears(["pause"]))
             # As if the clock had taken it off: the next report is refused.
             observer.client.leave("LEAVE", 300)
             observer.client = ClockClient(context, "view", subject.live.clock, "")
             subject.ask("set", set={"wall.stiffness": 200.0})
-            for _ in range(60):
-                observer.wait(50)
-                observer.poll()
-                events += observer.take_events()
-            roles = [node["role"] for node in subject.ask("status")[1]["nodes"]]
-            assert roles.count("view") == 1
-            assert [next(key for key in event if key != "at") for _, event in events] == ["pause", "set"]
+            wait_for("both events, each once", lambda: hears(["pause", "set"]))
+            for _ in range(20):
+                assert hears(["pause", "set"]), "nothing is heard twice"
         finally:
             context.destroy(linger=0)
         subject.ask("stop")

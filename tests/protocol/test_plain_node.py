@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import haploop.logger
+from helpers.live.launched import PATIENCE_S
 from helpers.live.live_run import Going, going, undisturbed
 
 OBSERVER = Path(__file__).parents[1] / "oracles/plain_observer.py"
@@ -39,7 +40,7 @@ class Observer:
             pass
         assert self.process.stdout
         with self.process.stdout:
-            assert self.process.wait(30) == 0
+            assert self.process.wait(PATIENCE_S) == 0
         return seen
 
     def kill(self) -> None:

@@ -6,7 +6,6 @@ import shlex
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -24,7 +23,7 @@ from haploop.launch.runs.start import prepare, run
 from haploop.launch.spec import OutputError, RunFailed
 from haploop.protocol.transport.keys import make_keys
 from haploop.protocol.transport.sockets import Transport
-from helpers.live.launched import HAPLOOP
+from helpers.live.launched import BRIEF, HAPLOOP, PATIENCE_S, wait_for
 from helpers.live.live_run import going
 
 HOUSE = Path(__file__).parents[2]
@@ -61,14 +60,6 @@ def last(held: Path) -> float:
     """The force that a device was given last, N."""
     lines = held.read_text().splitlines() if held.exists() else []
     return float(lines[-1]) if lines and lines[-1] else 0.0
-
-
-def wait_for(condition: Callable[[], bool]) -> None:
-    for _ in range(400):
-        if condition():
-            return
-        time.sleep(0.05)
-    raise AssertionError("It has not come to that.")
 
 
 def ran(out: Path, *overrides: str, plugins: tuple[Path, ...] = (), **options: Any) -> tuple[dict[str, Any], Any]:
@@ -135,7 +126,7 @@ def test_an_answer_that_is_late_is_counted_and_the_device_is_without_force_for_t
 
 @pytest.mark.slow
 def test_a_devices_time_is_neither_held_nor_hurried(tmp_path: Path) -> None:
-    with going(tmp_path, "duration=2", **BY_PLANT, **plant()) as live:
+    with going(tmp_path, "duration=600", **BY_PLANT, **plant()) as live:
         for verb in REFUSED:
             with pytest.raises(CommandRefused, match=GOES_ON):
                 live.ask(verb, **({"pace": "free"} if verb == "pace" else {}))
@@ -157,8 +148,8 @@ def test_a_devices_time_is_neither_held_nor_hurried(tmp_path: Path) -> None:
 )
 def test_a_device_is_given_no_force_when_the_rest_of_its_run_fails(tmp_path: Path, role: str, fault: int) -> None:
     held = tmp_path / "held"
-    with going(tmp_path, "wall.position=0.1", "duration=30", **BY_PLANT, **plant(*PLAIN, "0", held)) as live:
-        wait_for(lambda: last(held) != 0.0)
+    with going(tmp_path, "wall.position=0.1", "duration=600", BRIEF, **BY_PLANT, **plant(*PLAIN, "0", held)) as live:
+        wait_for("a force", lambda: last(held) != 0.0)
         pids = {node["role"]: node["pid"] for node in live.ask("status")[1]["nodes"]}
         os.kill(pids[role], fault)
         with suppress(RunFailed):
@@ -174,17 +165,17 @@ def test_a_device_is_given_no_force_when_the_launcher_is_killed(tmp_path: Path) 
     words += ["--out", str(tmp_path / "out"), "--node", f"plant={command}"]
     launcher = subprocess.Popen(words, stderr=subprocess.DEVNULL)
     try:
-        wait_for(lambda: last(held) != 0.0)
+        wait_for("a force", lambda: last(held) != 0.0)
     finally:
         launcher.kill()
         launcher.wait()
-    wait_for(lambda: last(held) == 0.0)
+    wait_for("no force", lambda: last(held) == 0.0)
 
 
 @pytest.mark.slow
 def test_who_attaches_and_hangs_does_not_hold_a_device_up(tmp_path: Path) -> None:
     observer = HOUSE / "tests/oracles/plain_observer.py"
-    with going(tmp_path, "duration=6", **BY_PLANT, **plant()) as live:
+    with going(tmp_path, "duration=6", "run.deadline=5", **BY_PLANT, **plant()) as live:
         command = [sys.executable, str(observer), str(live.run_json), "--dwell"]
         with subprocess.Popen(command, stdout=subprocess.DEVNULL) as attached:
             try:
@@ -201,8 +192,8 @@ def test_a_plant_in_python_takes_a_seat_that_waits_for_it(tmp_path: Path, tcp: s
     transport = Transport.from_options(tcp, tmp_path / "keys" if guarded else None)
     with going(tmp_path, "duration=1", programs=read_programs([], ["plant"]), transport=transport) as live:
         told = live.run_json.with_name("external-plant.json")
-        wait_for(told.exists)
-        subprocess.run([sys.executable, *map(str, PLAIN), str(told)], check=True, timeout=60)
+        wait_for("the seat", told.exists)
+        subprocess.run([sys.executable, *map(str, PLAIN), str(told)], check=True, timeout=PATIENCE_S)
         summary = live.result()
     assert summary["ticks"] == 1000
     assert abs(summary["energy"]["residual_J"]) < 1e-9 * summary["energy"]["moved_J"]

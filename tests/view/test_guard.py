@@ -14,6 +14,7 @@ from haploop.view.serve import assets, connections, server
 from haploop.view.serve.guard import Guard
 from haploop.view.serve.server import PortTaken, listen
 from helpers.live.browsing import site, stream, to_its_end
+from helpers.live.launched import PATIENCE_S
 
 
 class NoRuns:
@@ -296,7 +297,7 @@ async def test_where_asked_the_server_ends_once_its_last_page_is_closed_and_not_
             await asyncio.sleep(0.2)
             assert not serving.done()
             await second.close()
-            await asyncio.wait([serving], timeout=10 if until_closed else 0.3)
+            await asyncio.wait([serving], timeout=PATIENCE_S if until_closed else 0.3)
             assert serving.done() == until_closed
             end.set()
-            await asyncio.wait_for(serving, 20)
+            await asyncio.wait_for(serving, PATIENCE_S)

@@ -16,7 +16,7 @@ from haploop.tools.cli.view import LiveRuns
 from haploop.view.receive.run_session import RunSession
 from helpers.live.browsing import site, to_its_end
 from helpers.live.followed import follow, same, whole
-from helpers.live.launched import first_and_slowly
+from helpers.live.launched import PATIENCE_S, first_and_slowly
 from helpers.live.live_run import going
 
 
@@ -49,7 +49,7 @@ def test_the_verdict_comes_when_the_launcher_has_judged_the_run_and_until_then_i
     may_judge, launcher = threading.Event(), [True]
 
     def waits(*given):
-        assert may_judge.wait(20)
+        assert may_judge.wait(PATIENCE_S)
         return Finding("steady", "rest", push_N=0.2)
 
     class Launched(LiveRuns):

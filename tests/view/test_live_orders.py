@@ -97,7 +97,7 @@ def test_what_is_refused_comes_back_as_a_sentence_and_changes_nothing(tmp_path):
         assert (await tab.ask("resume"))[0]
         await asyncio.to_thread(run.result)
 
-    with_events = ("wall.position=-0.001", "duration=0.5", "run.deadline=30")
+    with_events = ("wall.position=-0.001", "duration=0.5")
     follow(play, tmp_path, *with_events, pauses=(300,))
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["ended"] == "done"

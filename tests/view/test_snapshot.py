@@ -18,6 +18,7 @@ from haploop.view.draw.messages import event_lines
 from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.store.history import AtWork, History
 from helpers.live.browsing import decode, to_its_end
+from helpers.live.launched import PATIENCE_S
 from helpers.scenes.least import typed
 
 TIME = Timebase(10_000, 1_000, 0, 100_000)
@@ -74,7 +75,7 @@ def test_a_log_that_is_not_there_yet_is_looked_for_again(tmp_path, monkeypatch):
         await asyncio.sleep(0.1)
         assert not filling.done()
         log_ticks(tmp_path, 300)
-        await asyncio.wait_for(filling, 20.0)
+        await asyncio.wait_for(filling, PATIENCE_S)
 
     to_its_end(play())
     x = prepended[0].steps.rows(["x"], 0, 300)[0]

@@ -99,9 +99,7 @@ def _kill_a_node(played: Played, dice: random.Random, live: run_directory.LiveRu
 
 
 def _stop_a_node(played: Played, dice: random.Random, live: run_directory.LiveRun) -> None:
-    role, pid = played.draw_node(dice)
-    if played.deadline_s < 2.0:
-        played.excuses.append(f"The {role} has not answered for {played.deadline_s:g} s")
+    _, pid = played.draw_node(dice)
     _stop(pid, dice.uniform(0.1, 2.0))
 
 

@@ -24,6 +24,8 @@ SOCKETS = ("clock", "loop", *PUBLISHERS)
 # An XSUB keeps a long subscription as a tree so deep that libzmq cannot take it down again; theirs is short.
 TOO_LARGE = {zmq.DEALER: 5 * 1024 * 1024, zmq.PUB: 5 * 1024 * 1024, zmq.XSUB: 5 * 1024}
 MAX_WHOLE, MIN_WHOLE = 2**64 - 1, -(2**63)
+# A test gives up after so long.
+_PATIENCE_MS = 120_000
 
 
 _packer = msgpack.Packer(autoreset=True)
@@ -132,7 +134,7 @@ class Stranger:
     def ask(self, *frames: bytes) -> list[Any]:
         """Send one message and return the answer: its code and fields."""
         self.socket.send_multipart(frames)
-        assert self.socket.poll(10_000), f"no answer to {frames!r:.200}"
+        assert self.socket.poll(_PATIENCE_MS), f"no answer to {frames!r:.200}"
         return msgpack.unpackb(self.socket.recv(), strict_map_key=False)[1:]
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import random
+import socket
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -17,10 +20,20 @@ ARGUMENTS = [
     "--disable-component-update", "--disable-sync",
 ]  # fmt: skip
 # What a browser says because of what a test does: it stops a server, and reads the pixels of a chart.
-OF_THE_TEST = ("ERR_CONNECTION_REFUSED", "willReadFrequently")
+OF_THE_TEST = ("ERR_CONNECTION_", "ERR_EMPTY_RESPONSE", "before receiving a handshake response", "willReadFrequently")
 DESK = {"width": 1280, "height": 720}
 PHONE = {"width": 390, "height": 844}
 
+# Resolves when a few frames have been drawn and nothing fades or moves any more.
+STILL = """() => new Promise(done => {
+    let frames = 0;
+    const look = () => {
+        const moves = document.getAnimations().some(({ playState }) => playState === "running");
+        if (++frames > 3 && !moves) done();
+        else requestAnimationFrame(look);
+    };
+    requestAnimationFrame(look);
+})"""
 # Whether a colour (r, g, b) is nearly there in a column of pixels of a chart, at parts (0 .. 1) of its plot's width.
 SEEN = """([chart, parts, colour]) => {
     const canvas = document.querySelector(`#${chart} canvas`);
@@ -48,6 +61,19 @@ RGB = """name => {
     probe.remove();
     return rgb;
 }"""
+
+
+def free_port() -> int:
+    """A port that the system gives to nobody by itself, so that it can be left and taken again."""
+    while True:
+        with socket.socket() as tried, suppress(OSError):
+            tried.bind(("127.0.0.1", random.randrange(10_000, 30_000)))
+            return tried.getsockname()[1]
+
+
+def still(page: Page) -> None:
+    """Wait until the page looks as it will stay."""
+    page.evaluate(STILL)
 
 
 def is_complaint(said: Any) -> bool:

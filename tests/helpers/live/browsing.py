@@ -16,9 +16,7 @@ from haploop.tools.cli.view import LiveRuns
 from haploop.view.receive.runs import Runs
 from haploop.view.serve.guard import Guard
 from haploop.view.serve.server import listen, serve
-
-# A test gives up after so long. It says nothing about how long anything may take.
-PATIENCE_S = 40.0
+from helpers.live.launched import PATIENCE_S
 
 
 def to_its_end(work: Coroutine[Any, Any, Any]) -> Any:
@@ -171,5 +169,5 @@ async def site(runs: Runs | None = None, **options: Any) -> AsyncIterator[Site]:
             yield here
         finally:
             end.set()
-            await asyncio.wait_for(server, 20)
+            await asyncio.wait_for(server, PATIENCE_S)
             here.close()

@@ -6,9 +6,10 @@ import numpy as np
 
 from haploop.logger import read
 from helpers.live.browsing import site, to_its_end
+from helpers.live.launched import wait_for
 from helpers.live.live_run import going
 
-TOUCHING = ("wall.position=-0.001", "duration=600", "run.deadline=30")
+TOUCHING = ("wall.position=-0.001", "duration=600")
 
 
 def follow(play, tmp_path, *overrides, options=None, **how):
@@ -29,12 +30,12 @@ async def stands(run, tick):
 
 async def has_logged(run, ticks):
     """Wait until so many ticks can be read from the log."""
-    for _ in range(400):
+
+    def look():
         log = read(run.prepared.out)
-        if len(log.get("/energy", {}).get("timestamp", ())) >= ticks:
-            return log
-        await asyncio.sleep(0.05)
-    raise AssertionError(f"the log does not get to {ticks} ticks")
+        return log if len(log.get("/energy", {}).get("timestamp", ())) >= ticks else None
+
+    return await asyncio.to_thread(wait_for, f"tick {ticks} in the log", look)
 
 
 def same(column, truth):

@@ -18,6 +18,7 @@ from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.spec import RunSpec
 from haploop.protocol.scene.scene import EventTable
+from helpers.live.launched import PATIENCE_S, PATIENT, wait_for
 
 SCENE = Path(__file__).parents[3] / "launch" / "scenes" / "fig6c.toml"
 
@@ -38,7 +39,7 @@ class Going:
         self._tell = announced
         self._thread = threading.Thread(target=self._lead, args=(options,))
         self._thread.start()
-        assert self._announced.wait(30), "the run was never announced"
+        assert self._announced.wait(PATIENCE_S), "the run was never announced"
         if self._error:
             raise self._error
 
@@ -67,17 +68,16 @@ class Going:
 
     def stands_at(self, tick: int, paused: bool = True) -> None:
         """Wait until the run stands still at ``tick``, every tick before it logged, on request or because it must."""
-        data: dict[str, Any] = {}
-        for _ in range(1500):
+
+        def stands() -> bool:
             data = self.ask("status")[1]
-            if data["paused"] == paused and data["granted"] == tick and data["tick"] == tick:
-                return
-            threading.Event().wait(0.02)
-        raise AssertionError(f"The run does not come to stand at tick {tick}: {data}")
+            return (data["paused"], data["granted"], data["tick"]) == (paused, tick, tick)
+
+        wait_for(f"standstill at tick {tick}", stands)
 
     def result(self) -> dict[str, Any]:
         """The summary, when the run has ended."""
-        self._thread.join(60)
+        self._thread.join(PATIENCE_S)
         assert not self._thread.is_alive(), "the run does not end"
         if self._error:
             raise self._error
@@ -88,7 +88,7 @@ class Going:
         if self._thread.is_alive():
             with suppress(run_directory.CommandRefused, run_directory.RunNotFound):
                 self.ask("stop")
-            self._thread.join(30)
+            self._thread.join(PATIENCE_S)
 
 
 @contextmanager
@@ -102,7 +102,7 @@ def going(
     """A run of figure 6(c) with overrides, standing still at the ticks ``pauses``."""
     with tempfile.TemporaryDirectory(prefix="hl", dir="/tmp") as base, pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", base)
-        prepared = prepare(SCENE, ("run.verdict=window", *overrides), out=tmp_path / "out")
+        prepared = prepare(SCENE, ("run.verdict=window", PATIENT, *overrides), out=tmp_path / "out")
         standing = tuple(EventTable(at=tick / 1000, pause=True) for tick in pauses)
         scene = replace(prepared.scene, event=standing)
         subject = Going(replace(prepared, scene=scene), announced, options)

@@ -5,13 +5,16 @@ from __future__ import annotations
 import asyncio
 import json
 import threading
-import time
 from collections.abc import Callable
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from aiohttp import WSMsgType, web
+
+from helpers.live.browser import free_port
+from helpers.live.launched import PATIENCE_S, wait_for
 
 STATIC = Path(__file__).parents[3] / "nodes/haploop/view/serve/static"
 TOKEN = "a-token"
@@ -98,10 +101,6 @@ RUNS = {
 }  # fmt: skip
 
 
-# A test gives up after so long.
-_PATIENCE_S = 20.0
-
-
 class StandIn:
     """A server of the page in a thread of its own.
 
@@ -117,12 +116,13 @@ class StandIn:
         self._told: dict[str, str] = {}
         self._snapshot: bytes | None = None
         self._sockets: set[web.WebSocketResponse] = set()
+        self._sent = 0
         # A page that has just come gets what was told before, then what is told meanwhile.
         self._one_at_a_time = asyncio.Lock()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever)
         self._thread.start()
-        self._port = 0
+        self._port = free_port()
         self.start()
 
     @property
@@ -143,16 +143,23 @@ class StandIn:
 
     def asked(self, is_so: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         """The stretch of time that was asked for last, once it is so: what a page asks for takes its time to arrive."""
-        give_up = time.monotonic() + _PATIENCE_S
-        while not (self.watches() and is_so(self.watches()[-1])):
-            assert time.monotonic() < give_up, f"asked for: {self.watches()}"
-            time.sleep(0.01)
+        wait_for("the question", lambda: self.watches() and is_so(self.watches()[-1]))
         return self.watches()[-1]
+
+    def ordered(self, is_so: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        """The last command, once it is so."""
+        wait_for("the order", lambda: self.commands() and is_so(self.commands()[-1]))
+        return self.commands()[-1]
+
+    def drawn(self) -> None:
+        """Wait until every page has drawn the last snapshot that it was sent."""
+        said = lambda: sum(message["snapshots"] for message in self.received if message["type"] == "drawn")  # noqa: E731
+        wait_for("the drawing", lambda: said() == self._sent)
 
     # From the test's thread
 
     def start(self) -> None:
-        """Serve, on the same port as before if there was one."""
+        """Serve, on the same port as before."""
         self._do(self._start())
 
     def stop(self) -> None:
@@ -180,7 +187,7 @@ class StandIn:
         self._do(self._show(snapshot))
 
     def _do(self, work: Any) -> None:
-        asyncio.run_coroutine_threadsafe(work, self._loop).result(20)
+        asyncio.run_coroutine_threadsafe(work, self._loop).result(PATIENCE_S)
 
     # In the server's thread
 
@@ -195,11 +202,11 @@ class StandIn:
             app.router.add_get(f"/static/{path.name}", self._file(path))
         self._runner = web.AppRunner(app, shutdown_timeout=0.1)
         await self._runner.setup()
-        site = web.TCPSite(self._runner, "127.0.0.1", self._port, reuse_address=True)
-        await site.start()
-        self._port = self._runner.addresses[0][1]
+        self._site = web.TCPSite(self._runner, "127.0.0.1", self._port, reuse_address=True)
+        await self._site.start()
 
     async def _stop(self) -> None:
+        await self._site.stop()  # before the pages, which come again
         for socket in list(self._sockets):
             await socket.close()
         await self._runner.cleanup()
@@ -217,12 +224,14 @@ class StandIn:
             for text in self._told.values():
                 await socket.send_str(text)
             if self._snapshot:
-                await socket.send_bytes(self._snapshot)
+                await self._send(socket, self._snapshot)
             self._sockets.add(socket)
-        async for message in socket:
-            if message.type is WSMsgType.TEXT:
-                await self._receive(socket, json.loads(message.data))
-        self._sockets.discard(socket)
+        try:
+            async for message in socket:
+                if message.type is WSMsgType.TEXT:
+                    await self._receive(socket, json.loads(message.data))
+        finally:
+            self._sockets.discard(socket)
         return socket
 
     async def _receive(self, socket: web.WebSocketResponse, message: dict[str, Any]) -> None:
@@ -234,10 +243,16 @@ class StandIn:
         async with self._one_at_a_time:
             self._told[kind] = text
             for socket in list(self._sockets):
-                await socket.send_str(text)
+                with suppress(ConnectionError):  # a page that is leaving
+                    await socket.send_str(text)
 
     async def _show(self, snapshot: bytes) -> None:
         async with self._one_at_a_time:
             self._snapshot = snapshot
             for socket in list(self._sockets):
-                await socket.send_bytes(snapshot)
+                await self._send(socket, snapshot)
+
+    async def _send(self, socket: web.WebSocketResponse, snapshot: bytes) -> None:
+        with suppress(ConnectionError):
+            await socket.send_bytes(snapshot)
+            self._sent += 1

@@ -49,11 +49,12 @@ class Deadlines:
         """Raises RunFailed where one of the run's own has kept silent too long, or has done nothing."""
         now, roster = self._look()
         if not roster.joined():
-            if now - self._started > START_DEADLINE_S:
+            limit_s = max(self._deadline_s, START_DEADLINE_S)
+            if now - self._started > limit_s:
                 missing = [role for role in self._children if not roster.own(role)]
                 names = " and the ".join(map(roster.label, missing))
                 refused = [roster.refused[role] for role in missing if role in roster.refused]
-                raise RunFailed(" ".join([f"The {names} did not join within {START_DEADLINE_S:g} s.", *refused]))
+                raise RunFailed(" ".join([f"The {names} did not join within {limit_s:g} s.", *refused]))
             return
         for node in roster.nodes.values():
             if node.is_gone and roster.is_external(node.role) and not node.done:

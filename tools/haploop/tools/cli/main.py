@@ -20,6 +20,7 @@ def main() -> None:
     """Runs the command line. Exit status: 0 done, 1 the run failed or was interrupted, 2 wrong usage or scene."""
     early: dict[str, Started] = {}
     try:
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
         with LeavingAtOnce(early):
             from haploop.launch.processes.one_thread import ask_for_one_thread
 
@@ -36,7 +37,6 @@ def main() -> None:
             asked.registered_commands = [
                 command for command in app.registered_commands if command.name in sys.argv[1:2]
             ] or app.registered_commands
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
         _refuse_what_is_no_text(sys.argv[1:])
         asked(obj={"early": early})  # typer puts things of its own beside it
     except OSError as error:  # one that no command has words of its own for
