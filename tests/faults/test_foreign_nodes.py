@@ -6,30 +6,21 @@ import json
 import os
 import shlex
 import signal
-import stat
-import subprocess
 import sys
-import tempfile
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
-from haploop.launch.processes import private_directory
 from haploop.launch.processes.foreign import Program, ProgramError, check_wait, read_programs
 from haploop.launch.processes.run_directory import CommandRefused
-from haploop.logger import read
 from haploop.tools.cli.app import app
+from helpers.live.foreign import PLAIN, Started
 from helpers.live.launched import (
     BRIEF,
     BRIEF_S,
-    PATIENCE_S,
     SCENE,
-    Launched,
-    Run,
-    alive,
     command,
     first_and_slowly,
     processes,
@@ -37,28 +28,7 @@ from helpers.live.launched import (
     wait_for,
 )
 
-CONTROLLER = Path(__file__).parents[1] / "oracles/plain_controller.py"
-PLAIN = shlex.join([sys.executable, "-I", str(CONTROLLER)])
 SOON = (BRIEF,)
-Started = Callable[..., Run]
-
-
-@pytest.fixture
-def started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Started]:
-    """Starts runs of figure 6(c) with the plain controller, and leaves none behind."""
-    runs: list[Run] = []
-
-    def start(*options: str, node: str | None = PLAIN, sets: tuple[str, ...] = (), **more: Any) -> Run:
-        nodes = ("--node", f"controller={node}") if node else ()
-        sets = ("duration=3", *sets)
-        runs.append(Run(tmp_path / f"out{len(runs)}", *nodes, *options, sets=sets, **{"pace": (), **more}))
-        return runs[-1]
-
-    with tempfile.TemporaryDirectory(prefix="hl") as base:  # short, for the sockets' names
-        monkeypatch.setenv("XDG_RUNTIME_DIR", base)
-        yield start
-        for run in runs:
-            run.clear_away()
 
 
 def test_a_foreign_controller_gives_the_bits_of_our_own_and_is_told_as_foreign(started: Started) -> None:
@@ -192,70 +162,6 @@ def test_no_scene_can_name_a_program() -> None:
     schema = ask("check", "--schema")
     assert schema.exit_code == 0
     assert not any("node" in key or "external" in key for key in json.loads(schema.stdout)["$defs"])
-
-
-def seat_of(run: Launched, role: str = "controller") -> Path:
-    """The file by which a program finds the run."""
-    return wait_for("the file", lambda: next(private_directory.base_directory().glob(f"*/external-{role}.json"), None))
-
-
-def joined(seat: Path, *options: str) -> subprocess.Popen[bytes]:
-    return subprocess.Popen([sys.executable, "-I", str(CONTROLLER), *options, "--seat", str(seat)])
-
-
-def test_a_run_waits_for_an_external_controller_and_gives_the_same_bits(started: Started) -> None:
-    own, run = started(node=None), started("--external", "controller", node=None)
-    seat = seat_of(run)
-    assert stat.S_IMODE(seat.stat().st_mode) == 0o600
-    assert "Waiting 60 s for a controller to join" in run.stderr
-    controller = joined(seat, "--nameless")
-    assert run.summary()["trajectory_sha256"] == own.summary()["trajectory_sha256"]
-    assert run.summary()["programs"]["controller"] == {"name": "", "version": "", "command": "", "own": False}
-    assert controller.wait(PATIENCE_S) == 0
-    assert not seat.exists()
-    assert read(run.out_directory).attachments.keys() == {"scene.toml", "programs.json"}
-    run.leaves_nothing()
-
-
-@pytest.mark.slow
-def test_an_external_controller_that_dies_is_noticed_at_once(started: Started) -> None:
-    run = started("--external", "controller", node=None)
-    controller = joined(seat_of(run), "--misbehave", "die")
-    run.end(1)
-    assert "The controller (external) is gone; the last tick all nodes had done is" in run.stderr
-    assert controller.wait(PATIENCE_S) == -signal.SIGKILL
-
-
-@pytest.mark.slow
-def test_of_two_programs_for_one_role_the_second_is_turned_away(started: Started, tmp_path: Path) -> None:
-    run = started("--external", "controller", "--external", "plant", node=None, sets=())
-    seat = seat_of(run)
-    first = joined(seat)
-    wait_for("the first", lambda: any(node["role"] == "controller" for node in run.ask("status")["nodes"]))
-    second = joined(seat)
-    assert second.wait(PATIENCE_S) == 1
-    assert run.ask("status")["refused"] == {"controller": "The role controller is taken."}
-    run.signal(signal.SIGINT)
-    run.end(1)
-    assert "Interrupted before the run began; nothing is left of it." in run.stderr
-    assert not run.out_directory.exists()
-    first.kill()
-    first.wait()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("end", first_and_slowly("wait", "stop", "interrupt"))
-def test_a_run_that_nobody_joins_leaves_nothing(end: str, started: Started) -> None:
-    run = started("--external", "controller", *(("--wait", "0.5") if end == "wait" else ()), node=None)
-    if end != "wait":
-        seat_of(run)
-        run.ask("stop") if end == "stop" else run.signal(signal.SIGINT)
-    run.end(1)
-    words = {"wait": "No program joined as the controller within 0.5 s", "stop": "The run was stopped before"}
-    assert words.get(end, "Interrupted before the run began") in run.stderr
-    assert not run.out_directory.exists()
-    assert not alive([run.pid])
-    run.leaves_nothing()
 
 
 @pytest.mark.slow

@@ -9,7 +9,6 @@ import pytest
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element, ElementError, Motion, PluginError, Quantity, registry
-from haploop.controller.dissipation.element import raised
 from haploop.controller.dissipation.registry import checked, load_source
 from haploop.launch.batch.run import run_batch
 from haploop.launch.processes.plugin_trial import PluginTrial
@@ -24,8 +23,6 @@ from haploop.launch.scene.toml_writer import to_toml
 from haploop.logger import read
 from haploop.protocol.changes import at_work, changes_of
 from haploop.protocol.ticks import Timebase
-from haploop.tools.cli import scenes
-from haploop.tools.executor.work import Work
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.run_figure import make_figure
 from helpers.scenes.least import LEAST
@@ -247,60 +244,3 @@ def test_a_run_with_a_swap_taken_back_replays_to_the_bit(tmp_path):
     repeated = replay(tmp_path / "run")
     assert not repeated.differences
     assert "not_made" in json.loads((tmp_path / "run" / "summary.json").read_text())
-
-
-def test_an_error_in_the_kept_copy_of_a_plugin_names_the_file_as_its_user_wrote_it():
-    source = (
-        "from haploop.controller.dissipation import Element\n\n\nclass Brake(Element):\n"
-        '    kind = "brake"\n\n    def force(self, motion):\n        raise ValueError("enough")\n'
-    )
-    brake = load_source(source, "/runs/one/plugins/brake-0123456789ab.py")["brake"]
-    assert raised(ValueError("enough"), brake) == "ValueError: enough (brake.py, line 7)"
-
-
-FORGETS = """
-from haploop.controller.dissipation import Element
-
-class Forgets(Element):
-    kind = "forgets"
-    memory = 0.0
-    asks = {asks}
-
-    def force(self, motion, memory):
-        print("heard")
-        return {answer}
-"""
-
-
-@pytest.mark.parametrize("asks", ["()", "('way',)"])
-@pytest.mark.parametrize("answer", ["-motion.v", "None", "(1.0, 2.0, 3.0)"])
-def test_an_element_that_forgets_its_memory_is_told_what_force_must_return(asks, answer, tmp_path):
-    says = r"force must return the force and the memory, as in: return f, memory \(forgets\.py, line 9\)"
-    text = FORGETS.format(asks=asks, answer=answer)
-    kind = load_source(text, "/runs/one/plugins/forgets-0123456789ab.py")["forgets"]
-    of = resolve(Layers(Path("scene.toml"), LEAST | {"dissipation": [{"kind": "forgets"}]}), {"forgets": kind})
-    controller = Controller(of, Timebase.from_scene(of), {"forgets": kind})
-    with pytest.raises(ElementError, match=says):
-        controller.answer([(-0.001,)])
-    if (asks, answer) == ("()", "-motion.v"):  # as it is tried before a run
-        (tmp_path / "forgets.py").write_text(text)
-        with pytest.raises(ElementError, match=says):
-            prepare(FIG6C, ['dissipation=[{kind="forgets"}]'], [tmp_path / "forgets.py"], tmp_path / "run")
-
-
-def test_what_an_element_prints_is_not_heard_again_where_its_run_is_judged_or_repeated(tmp_path, capfd):
-    (tmp_path / "loud.py").write_text(FORGETS.format(asks="()", answer="0.0, memory").replace("forgets", "loud"))
-    sets = ["duration=0.02", "run.verdict=window", "wall.position=-1", 'dissipation=[{kind="loud"}]']
-    run(prepare(FIG6C, sets, [tmp_path / "loud.py"], tmp_path / "run"), in_process=True)
-    assert "heard" in capfd.readouterr().err
-    scenes.judge(tmp_path / "run")
-    scenes.replay(tmp_path / "run")
-    said = capfd.readouterr()
-    assert "contact" in said.out
-    text = (tmp_path / "loud.py").read_text()
-    of = resolve(
-        Layers(Path("scene.toml"), LEAST | {"duration": 0.02, "dissipation": [{"kind": "loud"}]}),
-        {"loud": load_source(text, "loud.py")["loud"]},
-    )
-    Work(lambda _: of, sources=(("loud.py", text),)).run([0])
-    assert "heard" not in said.out + said.err + capfd.readouterr().err

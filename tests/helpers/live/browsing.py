@@ -7,13 +7,14 @@ import json
 from collections.abc import AsyncIterator, Callable, Coroutine
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
+from functools import wraps
 from typing import Any
 
 import aiohttp
 import numpy as np
 
 from haploop.tools.cli.view import LiveRuns
-from haploop.view.receive.runs import Runs
+from haploop.view.receive.runs import CommandFailed, Runs
 from haploop.view.serve.guard import Guard
 from haploop.view.serve.server import listen, serve
 from helpers.live.launched import PATIENCE_S
@@ -23,6 +24,39 @@ def to_its_end(work: Coroutine[Any, Any, Any]) -> Any:
     """Runs a coroutine to its end on a thread of its own: a browser of other tests may keep a loop on this one."""
     with ThreadPoolExecutor(1) as thread:
         return thread.submit(asyncio.run, work).result()
+
+
+class NoRuns:
+    """A place where nothing runs; remembers what it was asked."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, Any]] = []
+
+    def live(self) -> list[Any]:
+        return []
+
+    def stiffness_limit(self, scene: Any) -> None:
+        return None
+
+    def past(self) -> list[Any]:
+        return []
+
+    def has_launcher(self, run: Any) -> bool:
+        return False
+
+    def ask(self, run: Any, verb: str, arguments: Any) -> Any:
+        self.asked.append((verb, arguments))
+        raise CommandFailed("Nothing runs here.")
+
+
+def scenario(play: Callable[..., Coroutine[Any, Any, Any]]) -> Callable[..., None]:
+    """A test whose body is a coroutine."""
+
+    @wraps(play)
+    def test(*args: Any, **kwargs: Any) -> None:
+        to_its_end(play(*args, **kwargs))
+
+    return test
 
 
 def decode(data: bytes) -> dict[str, Any]:
@@ -171,3 +205,9 @@ async def site(runs: Runs | None = None, **options: Any) -> AsyncIterator[Site]:
             end.set()
             await asyncio.wait_for(server, PATIENCE_S)
             here.close()
+
+
+async def status(site: Site, path: str, **headers: str) -> int:
+    """The status of an answer to a request."""
+    async with site.session.get(f"{site.address}{path}", headers=headers, allow_redirects=False) as answer:
+        return answer.status
