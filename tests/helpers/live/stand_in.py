@@ -202,11 +202,11 @@ class StandIn:
             app.router.add_get(f"/static/{path.name}", self._file(path))
         self._runner = web.AppRunner(app, shutdown_timeout=0.1)
         await self._runner.setup()
-        self._site = web.TCPSite(self._runner, "127.0.0.1", self._port, reuse_address=True)
-        await self._site.start()
+        await web.TCPSite(self._runner, "127.0.0.1", self._port, reuse_address=True).start()
 
     async def _stop(self) -> None:
-        await self._site.stop()  # before the pages, which come again
+        for site in [*self._runner.sites]:  # before the pages, which come again
+            await site.stop()
         for socket in list(self._sockets):
             await socket.close()
         await self._runner.cleanup()
