@@ -158,9 +158,10 @@ def test_two_runs_side_by_side_each_give_the_bits_they_give_alone(running):
 
 @pytest.mark.slow
 def test_killing_a_node_of_one_run_does_not_disturb_the_one_beside_it(running, undisturbed):
-    doomed, other = running(), running(sets=("duration=3",), pace=("--pace", "2"))
+    doomed, other = running(), running(sets=("duration=3", "event=[{at=0.5, pause=true}]"), pace=("--pace", "2"))
     doomed.reaches(1)
-    other.reaches(1)
+    other.stands(500)
+    other.ask("resume")
     doomed.send("controller", signal.SIGKILL)
     doomed.end(1)
     assert other.summary()["ended"] == "done"

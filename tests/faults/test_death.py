@@ -9,7 +9,7 @@ import pytest
 import haploop.logger
 from haploop.launch.processes import run_directory
 from haploop.launch.runs.replay import replay
-from helpers.live.launched import BRIEF, BRIEF_S, LONG, ROLES, alive, first_and_slowly, same_bits, wait_for
+from helpers.live.launched import AT_REST, BRIEF, BRIEF_S, LONG, ROLES, alive, first_and_slowly, same_bits, wait_for
 
 NAMED = r"The {} was killed by SIGKILL; the last tick all nodes had done is (\d+) "
 
@@ -46,7 +46,7 @@ def test_a_node_killed_in_mid_run_ends_the_run_is_named_with_the_last_common_tic
 
 @pytest.mark.parametrize("role", first_and_slowly(*ROLES))
 def test_a_node_killed_as_it_starts_ends_the_run_and_is_named(role, running):
-    run = running()
+    run = running(sets=AT_REST)
     run.nodes_started(role)
     run.send(role, signal.SIGKILL)
     run.end(1)

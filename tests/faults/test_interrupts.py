@@ -9,7 +9,7 @@ import pytest
 
 import haploop.logger
 from haploop.launch.runs.replay import replay
-from helpers.live.launched import SCENE, first_and_slowly, same_bits, wait_for
+from helpers.live.launched import AT_REST, SCENE, first_and_slowly, same_bits, wait_for
 
 SIGNALS = first_and_slowly(signal.SIGINT, signal.SIGTERM)
 
@@ -51,7 +51,7 @@ def test_the_first_signal_ends_a_paused_run_where_it_stands(running, undisturbed
 
 
 def test_a_signal_before_the_first_tick_ends_the_run_in_order_at_tick_0(running, undisturbed):
-    run = running()
+    run = running(sets=AT_REST)
     wait_for("the run", lambda: run.live)
     run.nodes_started("plant")
     run.signal(signal.SIGINT)

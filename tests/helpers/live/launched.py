@@ -33,6 +33,8 @@ BRIEF_S = 3
 BRIEF = f"run.deadline={BRIEF_S}"
 # So long that it surely goes on while a test does something to it.
 LONG = ("duration=600",)
+# Its processes start, and its first tick does not come.
+AT_REST = (*LONG, "event=[{at=0, pause=true}]")
 PACE = ("--pace", "5")
 ROLES = tuple(PROCESSES)
 
