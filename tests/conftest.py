@@ -29,6 +29,10 @@ sys.dont_write_bytecode = False
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: item.get_closest_marker("long") is None)
+
+
 @pytest.fixture(autouse=True)
 def live_runs_here(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A short directory: the path of a socket must not be long."""

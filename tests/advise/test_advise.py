@@ -51,6 +51,7 @@ def test_a_safe_stiffness_is_rounded_down(value, down):
     assert rounded_down(value) == pytest.approx(down)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_an_advice_says_first_that_it_is_an_upper_bound_goes_on_when_stopped_and_leaves_scenes_that_rest_and_swing(
     tmp_path,

@@ -49,7 +49,8 @@ def sizes_of(found: Found) -> np.ndarray:
     return np.array([[values.get(kind, 0.0) for kind in KIND]])
 
 
-@pytest.mark.parametrize("device", ["premium15", "premium15_cable", "omega3"])
+@pytest.mark.long
+@pytest.mark.parametrize("device", ["premium15_cable", "premium15", "omega3"])
 def test_the_advised_wall_is_unfelt_in_every_corner_of_independent_loops_and_none_is_a_tenth_stiffer(device):
     """Against walls of a grid with any element there, alone and two together."""
     loop = loop_of(device)
