@@ -15,7 +15,7 @@ from haploop.launch.processes import children, deadlines, open_files
 from haploop.launch.processes.early import Started, start_early, start_node
 from haploop.launch.spec import OutputError, RunFailed
 from haploop.protocol.transport.messages import PROCESSES
-from helpers.live.launched import BRIEF, BRIEF_S, PATIENCE_S
+from helpers.live.launched import BRIEF, BRIEF_S, PATIENCE_S, wait_for
 from helpers.live.live_run import Going, going
 
 
@@ -46,6 +46,7 @@ def test_a_node_that_hangs_before_the_first_tick_is_named_after_the_deadline_of_
 
     with going(tmp_path, "duration=600", "run.deadline=2", start_gate=never_again) as run:
         stop_when_joined(run, role)
+        wait_for("the others", lambda: len(run.ask("status")[1]["nodes"]) == len(PROCESSES))
         monkeypatch.setattr(deadlines, "START_DEADLINE_S", 4.0)
         with pytest.raises(RunFailed) as failed:
             run.result()
