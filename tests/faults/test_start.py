@@ -44,13 +44,13 @@ def test_a_node_that_hangs_before_the_first_tick_is_named_after_the_deadline_of_
         all_were_ready.append(ready)
         return False
 
-    with going(tmp_path, "duration=600", "run.deadline=2", start_gate=never_again) as run:
+    with going(tmp_path, "duration=600", BRIEF, start_gate=never_again) as run:
         stop_when_joined(run, role)
         wait_for("the others", lambda: len(run.ask("status")[1]["nodes"]) == len(PROCESSES))
-        monkeypatch.setattr(deadlines, "START_DEADLINE_S", 4.0)
+        monkeypatch.setattr(deadlines, "START_DEADLINE_S", 2 * BRIEF_S)
         with pytest.raises(RunFailed) as failed:
             run.result()
-    limit_s = 2 if role == "controller" and all_were_ready else 4
+    limit_s = BRIEF_S if role == "controller" and all_were_ready else 2 * BRIEF_S
     assert re.search(rf"The {role} has not answered for {limit_s} s .* done is 0 ", str(failed.value))
 
 
