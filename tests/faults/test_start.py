@@ -13,6 +13,7 @@ import pytest
 
 from haploop.launch.processes import children, deadlines, open_files
 from haploop.launch.processes.early import Started, start_early, start_node
+from haploop.launch.processes.foreign import read_programs
 from haploop.launch.spec import OutputError, RunFailed
 from haploop.protocol.transport.messages import PROCESSES
 from helpers.live.launched import BRIEF, BRIEF_S, PATIENCE_S, wait_for
@@ -52,6 +53,19 @@ def test_a_node_that_hangs_before_the_first_tick_is_named_after_the_deadline_of_
             run.result()
     limit_s = BRIEF_S if role == "controller" and all_were_ready else 2 * BRIEF_S
     assert re.search(rf"The {role} has not answered for {limit_s} s .* done is 0 ", str(failed.value))
+
+
+@pytest.mark.slow
+def test_a_process_that_never_joins_is_waited_for_as_long_as_the_run_says_where_that_is_longer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(deadlines, "START_DEADLINE_S", 0.5)
+    asleep = read_programs(["controller=sh -c 'exec sleep 1000'"], [])
+    with (
+        going(tmp_path, "run.deadline=2", programs=asleep) as run,
+        pytest.raises(RunFailed, match=r"did not join within 2 s"),
+    ):
+        run.result()
 
 
 @pytest.mark.slow
