@@ -153,7 +153,7 @@ def test_the_launcher_never_runs_a_plugin_while_its_run_goes_on(running, scene, 
 def test_a_change_that_hangs_in_the_controller_alone_is_refused_at_its_tick_and_the_run_goes_on(
     running, scene, tmp_path
 ):
-    """As no trial elsewhere can find out. Who asked is told so, too, unless the machine is so busy that it takes 3 s."""
+    """As no trial elsewhere can find out. Who asked is told so, too, unless that takes a busy machine 3 s."""
     plugin = tmp_path / "brake.py"
     plugin.write_text(source())
     run = running("--plugin", str(plugin), scene=scene, sets=(*LONG, "run.deadline=1.5"))
@@ -161,9 +161,10 @@ def test_a_change_that_hangs_in_the_controller_alone_is_refused_at_its_tick_and_
     there = "sys.argv[0].endswith(os.path.join('controller', 'node.py'))"
     plugin.write_text(source(at_making=f"time.sleep(1000) if {there} else None"))
     try:
-        assert "when time gets there" in run_directory.ask(run.live, "swap", **SWAP, reload=True)[0]
-    except run_directory.CommandRefused as refused:
-        assert re.search(r"The change at tick \d+, .*DeadlineOver", str(refused))
+        told = run_directory.ask(run.live, "swap", **SWAP, reload=True)[0]
+    except run_directory.CommandRefused as refusal:
+        told = str(refusal)
+    assert re.search(r"when time gets there|The change at tick \d+, .*DeadlineOver", told)
     run.reaches(run.ask("status")["granted"] + 500)
     run.ask("stop")
     assert run.summary()["ended"] == "stopped"
