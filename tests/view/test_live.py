@@ -159,6 +159,7 @@ def test_a_paused_run_sends_its_snapshot_once(tmp_path):
     async def play(run, tab, here):
         await stands(run, 300)
         await whole(tab, run, 300)
+        seen = -1
         for _ in range(50):  # what was on its way comes first
             seen = tab.snapshots
             for _ in range(2):

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 # run, and programs that take the place of its own.
 Start = Callable[[Path, Callable[[str], Message], bool, int, Mapping[str, Program]], dict[str, Child]]
 
-# What the logger is given to save its files after another node has failed.
-_SAVING_S = 0.7
+# What the logger is given to save its files after another node has failed; on a busy machine that takes its time.
+_SAVING_S = 2.0
 # Between looks at nodes that say nothing; commands, reports and deaths are noticed at once.
 _LOOK_MS = 100
 
