@@ -212,7 +212,7 @@ def test_on_a_dask_cluster_of_which_a_worker_is_killed_the_table_is_the_same(
     few = SLOW.replace("480", "120")
     whole = swept(tmp_path, few, SLOW_PRESS, out=tmp_path / "whole")
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", host="127.0.0.1"
     ) as cluster:
         out = tmp_path / "out"
         run = launched("sweep", str(tmp_path / "sweep.toml"), "--dask", cluster.scheduler_address, out=out)
