@@ -31,7 +31,7 @@ SETUP = Setup(
 
 
 def reached(*steady: float) -> Reached:
-    return Reached("damping", (1.0,), steady, 0, 0.0)
+    return Reached("damping", (1.0,), steady, 0.0)
 
 
 def test_the_largest_stiffness_has_no_gap_below_it() -> None:

@@ -132,14 +132,12 @@ class Reached(NamedTuple):
     """The largest steady stiffness of an element, N/m: with which size, and by the judge from each start.
 
     Attributes:
-        unfelt: how many starts leave nothing there that a hand feels.
         twice: the largest, in the batches by which the size was chosen, if a swing might be twice as wide.
     """
 
     kind: str
     sizes: tuple[float, ...]
     steady: tuple[float, ...]
-    unfelt: int
     twice: float
 
     @property
@@ -149,8 +147,15 @@ class Reached(NamedTuple):
 
     def describe(self) -> str:
         """Returns it in N/mm: ``"4.96 [4.87, 5.05]"``, or ``"4.5"`` where all starts come to the same."""
-        mean, low, high = self.mean
-        return f"{mean:.1f}" if low == high else f"{mean:.2f} [{low:.2f}, {high:.2f}]"
+        return in_words(self.mean)
+
+
+def in_words(mean: Interval) -> str:
+    """Returns a mean with its interval, alone where all starts come to the same, and ``"none"`` for 0."""
+    value, low, high = mean
+    if not value:
+        return "none"
+    return f"{value:.1f}" if high - low < 1e-9 else f"{value:.2f} [{low:.2f}, {high:.2f}]"
 
 
 def beats(one: Reached, other: Reached) -> bool:
@@ -168,8 +173,8 @@ def sizes_of(kind: str, small: bool) -> np.ndarray:
     return (DAMPINGS if kind == KINDS[1] else MASSES)[:: 8 if small else 1, None]
 
 
-class _Presses(NamedTuple):
-    """_Presses on some walls, in N/m, with some sizes of an element, from some starts."""
+class Presses(NamedTuple):
+    """Presses on some walls, in N/m, with some sizes of an element, from some starts."""
 
     setup: Setup
     kind: str
@@ -187,25 +192,20 @@ class _Presses(NamedTuple):
         swings = [swing_m(result) for result in run_all([pressed(scene) for scene in self.scenes()])]
         return np.array(swings).reshape(len(self.walls), len(self.sizes), -1)
 
-    def judged(self) -> list[tuple[float, bool]]:
-        """Returns from each start the largest stiffness in N/m up to which all are steady, and whether none is felt.
+    def judged(self) -> list[float]:
+        """Returns from each start the largest stiffness in N/m up to which all are steady with the first size.
 
         By the judge of runs, which holds the hand, takes the noise away, pushes twice, and watches until it tells, for
         up to 16 s.
         """
         results = run_batch(self.scenes(), registry(), energy=False)
-        found: list[tuple[float, bool]] = []
-        for start in range(len(self.starts)):
-            climbed = results[start :: len(self.starts)]
-            count = rungs_held(map(is_judged_steady, climbed))
-            unfelt = count > 0 and climbed[count - 1]["verdict"] == "steady"
-            found.append((self.walls[count - 1] if count else 0.0, unfelt))
-        return found
+        counts = [rungs_held(map(is_judged_steady, results[at :: len(self.starts)])) for at in range(len(self.starts))]
+        return [self.walls[count - 1] if count else 0.0 for count in counts]
 
 
 def judged_largest(setup: Setup, kind: str, size: Sequence[float], start: int) -> float:
     """Returns the largest stiffness in N/m that a size of an element steadies from a start, by the judge of runs."""
-    return _Presses(setup, kind, STIFFNESSES.tolist(), [size], (start,)).judged()[0][0]
+    return Presses(setup, kind, STIFFNESSES.tolist(), [size], (start,)).judged()[0]
 
 
 def is_judged_steady(result: Summary) -> bool:
@@ -224,8 +224,8 @@ def tried(answers: Answers, setup: Setup, kind: str, sizes: np.ndarray) -> Range
     """Runs every size on every wall from the starts by which a size is chosen."""
     starts = CHOSEN_BY[:1] if answers.small else CHOSEN_BY
     parts = np.array_split(STIFFNESSES, 1 if answers.small else _PARTS)
-    presses = [_Presses(setup, kind, part.tolist(), sizes.tolist(), starts) for part in parts]
-    swings_m = answers.map_parallel(f"walls with {kind.replace('-', ' ')}", _Presses.swings_m, presses)
+    presses = [Presses(setup, kind, part.tolist(), sizes.tolist(), starts) for part in parts]
+    swings_m = answers.map_parallel(f"walls with {kind.replace('-', ' ')}", Presses.swings_m, presses)
     return Range(sizes, np.concatenate(swings_m))
 
 
@@ -253,10 +253,9 @@ def reached(answers: Answers, setup: Setup, kind: str) -> Reached:
     twice = float(STIFFNESSES[rungs - 1]) if rungs else 0.0
     if answers.small:
         level = largest(grid.swings_m[:, best] <= WIDEST_M)
-        return Reached(kind, sizes, (level,) * 2, 0, twice)
+        return Reached(kind, sizes, (level,) * 2, twice)
     half = len(JUDGED_BY) // 2
     walls = STIFFNESSES.tolist()
-    halves = [_Presses(setup, kind, walls, [sizes], starts) for starts in (JUDGED_BY[:half], JUDGED_BY[half:])]
-    parts = answers.map_parallel(f"judging {kind.replace('-', ' ')}", _Presses.judged, halves)
-    steady, unfelt = zip(*(one for part in parts for one in part), strict=True)
-    return Reached(kind, sizes, steady, sum(unfelt), twice)
+    halves = [Presses(setup, kind, walls, [sizes], starts) for starts in (JUDGED_BY[:half], JUDGED_BY[half:])]
+    parts = answers.map_parallel(f"judging {kind.replace('-', ' ')}", Presses.judged, halves)
+    return Reached(kind, sizes, tuple(one for part in parts for one in part), twice)

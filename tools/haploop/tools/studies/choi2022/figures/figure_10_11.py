@@ -13,6 +13,7 @@ from haploop.tools.studies.choi2022.experiment import LOW_KG, PAIR, PAIR_AT_N_M,
 from haploop.tools.studies.choi2022.figures.claims import Finding
 from haploop.tools.studies.choi2022.figures.drawing import COLOURS, INSIDE, SHORT, UPPER_LEFT, legend_of_colours
 from haploop.tools.studies.choi2022.figures.work import Work
+from haploop.tools.studies.choi2022.run_word import steady_to_run
 from haploop.tools.studies.choi2022.steadiness import (
     STEP_N_M,
     STIFFNESSES,
@@ -21,6 +22,7 @@ from haploop.tools.studies.choi2022.steadiness import (
     Reached,
     beats,
     held,
+    in_words,
     reached,
     sizes_of,
     tried,
@@ -63,15 +65,14 @@ def make_10(work: Work) -> list[Finding]:
     bears = ", ".join(f"{SHORT[kind]} {one.describe()}" for kind, one in most.items())
     *others, uni = (most[kind] for kind in KINDS[1:])
     is_first = all(beats(uni, one) for one in others)
-    contacts = sum(len(one.steady) for one in most.values())
+    by_run = {kind: in_words(steady_to_run(work, setup, kind)) for kind in KINDS}
     computed = {
         "starts": len(uni.steady),
         "bears": bears,
-        "contacts": contacts,
-        "felt": contacts - sum(one.unfelt for one in most.values()),
+        "by_run": ", ".join(f"{SHORT[kind]} {told}" for kind, told in by_run.items()),
     }
     work.conclude("first" if is_first else "not_first", supports=is_first, **computed)
-    work.notes = [_words(work, most), _why(work, setup)]
+    work.notes = [_words(work, most, by_run), _why(work, setup)]
     return _findings(work, grids, most, bears)
 
 
@@ -137,19 +138,19 @@ def _pairs(dampings: np.ndarray, masses: np.ndarray, bears: np.ndarray) -> Figur
     return figure
 
 
-def _words(work: Work, most: dict[str, Reached]) -> str:
+def _words(work: Work, most: dict[str, Reached], by_run: dict[str, str]) -> str:
     rows = [
         [
             SHORT[kind],
             ", ".join(f"{size:.3g} N s/m" if kind == KINDS[1] else f"{1e3 * size:.3g} g" for size in one.sizes),
             one.describe(),
             f"{min(one.steady) / 1e3:.1f} to {max(one.steady) / 1e3:.1f}",
-            f"{one.unfelt} of {len(one.steady)}",
+            by_run[kind],
             f"{one.twice / 1e3:.1f}",
         ]
         for kind, one in most.items()
     ]
-    heads = ["element", "best size", "N/mm, mean [95 %]", "least to most", "nothing felt there", "swings twice as wide"]
+    heads = ["element", "best size", "N/mm, mean [95 %]", "least to most", "steady to `run`", "swings twice as wide"]
     return work.tell("words", table=markdown_table(heads, rows, numbers=(2, 3, 4, 5)))
 
 
