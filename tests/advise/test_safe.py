@@ -1,6 +1,10 @@
 """Safe walls: each rests, or is unfelt, in independent loops at other holds in every corner; none is much stiffer."""
 
+import re
+from collections.abc import Sequence
 from itertools import product
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +20,7 @@ from helpers.scenes.presets import loop_of
 from oracles.held_wall import ASSUMED, DEVICES, LASTS_S, buzzes, columns, in_corners, press
 
 pytestmark = pytest.mark.slow
+ADVICE = Path(__file__).parents[2] / "docs/advise.md"
 HOLDS = np.linspace(0.3, 3.0, 11)
 # Sway of the hand, its frequency in Hz, and the speed of the tap in m/s: how every wall is met.
 WAYS = np.array([(0.3, 0.5, 0.2), (0.3, 0.3, 0.2), (0.0, 0.5, 0.2), (0.3, 0.5, 0.05)])
@@ -58,20 +63,29 @@ def test_the_advised_wall_is_unfelt_in_every_corner_of_independent_loops_and_non
         found, held = search(loop, [of.key for of in assumptions(bundled("devices")[device])], trial), hold_N(loop)
     assert found.stiffness_N_m >= found.alone_N_m > 0.0
     assert safe(device, held, np.array([found.stiffness_N_m]), sizes_of(found), most=32).all()
+    around = [sizes_of(found)[0] * factor for factor in (0.7, 0.84, 1.0, 1.19, 1.41)]
+    assert not a_tenth_stiffer(device, held, found.stiffness_N_m, around)
+
+
+@pytest.mark.parametrize("device", ["falcon", "touch"])
+def test_no_element_makes_a_wall_safe_that_is_a_tenth_stiffer_than_the_one_advised_without_any(device):
+    [told] = re.findall(rf"`{device}` \| at most ([\d.]+) N/mm \| nothing", ADVICE.read_text(encoding="utf-8"))
+    assert not a_tenth_stiffer(device, hold_N(loop_of(device)), 1e3 * float(told))
+
+
+def a_tenth_stiffer(device: str, hold_N: float, stiffness_N_m: float, around: Sequence[np.ndarray] = ()) -> list[Any]:
+    """Walls a tenth stiffer, and more, that are safe with an element of a grid, two of them, or of the sizes around."""
     of = DEVICES[device]
     moved = of.mass + of.motor_mass
     largest = np.array([moved / 5e-4, moved, moved])  # beyond, the element alone makes the device unstable
     shares = 2.0 ** -np.arange(1.0, 10.0)
     choices = [np.zeros(3), *(share * largest * only for share, only in product(shares, np.eye(3)))]
     choices += [largest * (b, 0.0, m) for b, m in product(shares[2::2], shares[3::2])]
-    advised_sizes = sizes_of(found)[0]
-    choices += [advised_sizes * factor for factor in (0.7, 0.84, 1.0, 1.19, 1.41)]
-    stiffness = found.stiffness_N_m * 1.1 * 1.06 ** np.arange(2.0)
-    walls = list(product(stiffness, choices))
-    for corners in (16, 64):  # few first; what passes there is met as the advised wall is
+    walls = list(product(stiffness_N_m * 1.1 * 1.06 ** np.arange(2.0), [*choices, *around]))
+    for corners in (4, 16, 64):  # few first; what passes there is met as the advised wall is
         left = np.array([k for k, _ in walls]), np.array([each for _, each in walls]).reshape(-1, len(KIND))
-        walls = [wall for wall, good in zip(walls, safe(device, held, *left, most=corners), strict=True) if good]
-    assert not walls
+        walls = [wall for wall, good in zip(walls, safe(device, hold_N, *left, most=corners), strict=True) if good]
+    return walls
 
 
 def test_the_wall_that_was_once_advised_for_the_premium_buzzes_at_every_hold_in_nearly_every_corner():
