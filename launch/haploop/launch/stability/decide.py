@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from haploop.launch.stability.swing import FEW_PIECES, LEAST_PERIODS, REST_M, SAME, Swing
+from haploop.launch.stability.swing import REST_M, SAME, Swing
 from haploop.launch.stability.traces import is_felt, smallest_felt_m
 
 # A swing that dies is watched until it is this small, or for long.
@@ -25,8 +25,12 @@ _ALIKE_S = 4.0
 _WIDER = 1.2
 # A frequency is known from so many periods on.
 _SEEN_PERIODS = 6.0
+# How a swing changes is told by so many, wherever its turns fall.
+_TELLING_PERIODS = 7.0
 # A run of more than this is asked of nobody.
 _LONGEST_S = 3600.0
+# A command that ripples by less is constant, but for rounding.
+_STILL_N = 1e-9
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
 _COUNTS = 10
 
@@ -144,25 +148,26 @@ def decide(swing: Swing, *, last: bool) -> Finding:
 
     *steady*: the swing died, or dies or lasts and what is left of it no hand feels, or at the last look both swings
     still decay alike. *limit-cycle*: it forgets how hard it was pushed, yet remains, and is felt. *growing*: both
-    swings grow. Of swings so slow that a piece covers less than two nothing is said.
+    swings grow. Of swings of fewer than six periods nothing is said.
     """
     if not swing.inside:
         return Finding("undecided", "leaves the wall", swing.push_N, swing.watched_s)
     if swing.most_m < REST_M and swing.moved_m < _SMALL_M:
         return _finding(swing, "steady", "rest")
     is_long, changes = swing.watched_s >= _LONG_S, [*zip(swing.changes, swing.errors, strict=True)]
-    covers = swing.covers_periods >= LEAST_PERIODS
     # Of what is too slow for its pieces all of its way counts, since they show but a part of it.
-    size_m = swing.width_m if covers else swing.moved_m
+    size_m = swing.width_m if swing.covers else swing.moved_m
     rising = any(change > max(_LASTING, 3 * error) for change, error in changes)
-    falling = max(swing.changes) < -_LASTING and (size_m < _SMALL_M or (is_long and covers))
+    falling = max(swing.changes) < -_LASTING and (size_m < _SMALL_M or (is_long and swing.covers))
     forgets = swing.lasts(_LASTING) and SAME[0] < swing.at_last < SAME[1] and not 0.5 < swing.at_first < 2.0
     unfelt = swing.times_felt < 1.0 and not is_felt(swing.width_m, swing.frequency_Hz)
     seen = swing.frequency_Hz * swing.watched_s >= _SEEN_PERIODS or not is_felt(swing.moved_m, swing.frequency_Hz)
-    goes_on = not (falling or size_m <= 2.0 * swing.count_m or (forgets and covers))
-    if unfelt and seen and not rising and not goes_on:
+    goes_on = not (falling or size_m <= 2.0 * swing.count_m or (forgets and swing.covers))
+    # What dies behind an encoder whose counts still move may leave a chatter of them that is felt.
+    settles = falling and swing.count_m > 0.0 and swing.ripple_N > _STILL_N and not is_long
+    if unfelt and seen and not (rising or goes_on or settles):
         return _finding(swing, "steady", "unfelt")
-    if not covers:
+    if not swing.covers:
         return _finding(swing, "undecided", "too slow")
     if forgets:
         return _finding(swing, "limit-cycle", "forgets")
@@ -172,7 +177,8 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     settled = all(abs(change) <= max(3 * error, _SETTLED) for change, error in changes)
     if settled and (clearly or (is_long and counted and swing.lasts(_LASTING_LONG))) and not kept_ratio:
         return _finding(swing, "limit-cycle", "lasts")
-    grows = all(change > 4 * error for change, error in changes)
+    # A chatter within the counts of an encoder grows, but not for good.
+    grows = all(change > 4 * error for change, error in changes) and (last or swing.width_m > 2.0 * swing.count_m)
     soon = swing.watched_s >= _ALIKE_S and min(swing.changes) > _LASTING and swing.is_alike()
     if grows and (soon or (is_long and (min(swing.changes) > _LASTING_LONG or swing.is_alike()))):
         return _finding(swing, "growing", "grows")
@@ -189,7 +195,7 @@ def _finding(swing: Swing, word: str, why: str) -> Finding:
     needs_s = None
     if word == "undecided":
         change, error = min(pairs, key=lambda each: abs(each[0]))
-        needs_s = FEW_PIECES * LEAST_PERIODS / swing.frequency_Hz if swing.frequency_Hz else 0.0
+        needs_s = _TELLING_PERIODS / swing.frequency_Hz if swing.frequency_Hz else 0.0
         needs_s = max(needs_s, swing.watched_s * max(2.0, 4.0 * error / max(abs(change), 1e-12)))
         if swing.rate_1_s < 0.0:
             needs_s = max(needs_s, swing.watched_s + math.log(max(swing.width_m / felt_m, 1.0)) / -swing.rate_1_s)

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from haploop.launch.stability.traces import frequency_Hz, most_felt, sizes, smallest_felt_m, trend, widths
+from haploop.launch.stability.turns import turns_of
 from haploop.logger.verdict.ripple import RIPPLE_ABOVE_HZ, above, ripple
 
 # Pieces in which the width of a swing is measured, and the periods that one covers at least.
-PIECES, FEW_PIECES = 24, 8
-LEAST_PERIODS = 2.0
+_PIECES, _FEW_PIECES = 24, 8
+_LEAST_PERIODS = 2.0
 # What the place where pieces begin in a period makes of the change of the logarithm of the width, times the eighth
 # power of the periods that a piece covers (found with sines); at least and at most.
 _PHASE, _UNSURE = 6.0, (1e-4, 1.0)
@@ -60,7 +61,7 @@ class Swing(NamedTuple):
         moved_m: peak to peak over the last half of either, with its trend.
         at_first, at_last: width after the larger push over that after the smaller, in the first piece and at the last.
         frequency_Hz: of the end.
-        covers_periods: periods that a piece covers.
+        covers: whether a piece covers periods enough to tell how the swing changes, or its turns tell.
         times_felt: how strong the last quarter of either is, in terms of what is felt.
     """
 
@@ -82,7 +83,7 @@ class Swing(NamedTuple):
     at_last: float
     frequency_Hz: float
     ripple_N: float
-    covers_periods: float
+    covers: bool
     times_felt: float
 
     def lasts(self, within: float) -> bool:
@@ -98,8 +99,9 @@ class Swing(NamedTuple):
 
 
 def measure(pushed: Pushed, rate: float) -> list[Swing]:
-    """Returns the measures of each loop, worked out as if it were alone; slow swings in fewer, longer pieces.
+    """Returns the measures of each loop, worked out as if it were alone.
 
+    Slow swings are measured in fewer, longer pieces, those too slow for these from turn to turn.
     Of one that rests but for a slow swing that no hand feels, and a fast one that it does, the fast one is measured.
 
     ``rate``: ticks a second.
@@ -114,7 +116,7 @@ def measure(pushed: Pushed, rate: float) -> list[Swing]:
     rests = (moved_m < 2.0 * smallest_felt_m(frequency)) & (moved_m < np.maximum(_CREEP * pushed.count_m, _CREEP_M))
     is_buried = (times_felt >= 1.0) & rests & (fast_Hz > RIPPLE_ABOVE_HZ)
     frequency = np.where(is_buried, fast_Hz, frequency)
-    is_slow = ticks // PIECES * frequency / rate < LEAST_PERIODS
+    is_slow = ticks // _PIECES * frequency / rate < _LEAST_PERIODS
     found: dict[int, Swing] = {}
     for slow, buried in product((False, True), repeat=2):
         places = np.flatnonzero((is_slow == slow) & (is_buried == buried))
@@ -122,9 +124,9 @@ def measure(pushed: Pushed, rate: float) -> list[Swing]:
             some = Pushed(*(part[places] for part in pushed))
             if buried:
                 some = some._replace(small=above(some.small, rate), large=above(some.large, rate))
-            rows = _measured(some, rate, frequency[places], times_felt[places], FEW_PIECES if slow else PIECES)
+            rows = _measured(some, rate, frequency[places], times_felt[places], _FEW_PIECES if slow else _PIECES)
             found |= {place: Swing(ticks / rate, *row) for place, row in zip(places.tolist(), rows, strict=True)}
-    return [found[place] for place in range(len(frequency))]
+    return [_by_turns(found[i], pushed.small[i], pushed.large[i], rate) for i in range(len(frequency))]
 
 
 def _measured(
@@ -156,7 +158,32 @@ def _measured(
         ends[1] / np.maximum(ends[0], REST_M),
         frequency,
         ripple(command[:, last_quarter], rate),
-        covers,
+        covers >= _LEAST_PERIODS,
         times_felt,
     ]
     return zip(*(column.tolist() for column in columns), strict=True)
+
+
+def _by_turns(swing: Swing, small_x: np.ndarray, large_x: np.ndarray, rate: float) -> Swing:
+    """Returns the measures of a swing too slow for its pieces, shape (ticks,), from its turns if they are enough."""
+    if swing.covers or swing.most_m < REST_M:
+        return swing
+    small, large = turns_of(small_x, rate), turns_of(large_x, rate)
+    if not (small and large):
+        return swing
+    # Turns of something faster beside the swing are not its own.
+    if not all(SAME[0] < turns.frequency_Hz / swing.frequency_Hz < SAME[1] for turns in (small, large)):
+        return swing
+    slower = min(small, large, key=lambda turns: abs(turns.trend.rate_1_s))
+    return swing._replace(
+        changes=(float(small.trend.change), float(large.trend.change)),
+        errors=(float(small.trend.error), float(large.trend.error)),
+        rate_1_s=float(slower.trend.rate_1_s),
+        error_1_s=float(slower.trend.error_1_s),
+        width_m=(small.last_m + large.last_m) / 2.0,
+        spread_m=abs(large.last_m - small.last_m) / 2.0,
+        at_first=large.first_m / small.first_m,
+        at_last=large.last_m / small.last_m,
+        frequency_Hz=large.frequency_Hz,
+        covers=True,
+    )

@@ -61,14 +61,18 @@ def trend(width: np.ndarray, spacing_s: float, unsure: np.ndarray | float = 0.0)
 
     ``unsure`` is a standard error of the change that does not show in the scatter, shape (...).
     """
+    count = width.shape[-1]
+    t_s = (np.arange(count) - (count - 1) / 2.0) * spacing_s
+    return trend_at(width, t_s, count * spacing_s, unsure)
+
+
+def trend_at(width: np.ndarray, t_s: np.ndarray, seconds: float, unsure: np.ndarray | float = 0.0) -> Trend:
+    """Returns the growth of widths at times from their mean, and their change over so long; see ``trend``."""
     logs = np.log(np.maximum(width, LEAST_WIDTH_M))
-    count = logs.shape[-1]
-    t = (np.arange(count) - (count - 1) / 2.0) * spacing_s
-    square = np.vecdot(t, t)
-    rate = np.vecdot(logs, t) / square
-    left = logs - logs.mean(axis=-1, keepdims=True) - rate[..., None] * t
-    seconds = count * spacing_s
-    error = np.hypot(np.sqrt(np.vecdot(left, left) / ((count - 2) * square)), unsure / seconds)
+    square = np.vecdot(t_s, t_s)
+    rate = np.vecdot(logs, t_s) / square
+    left = logs - logs.mean(axis=-1, keepdims=True) - rate[..., None] * t_s
+    error = np.hypot(np.sqrt(np.vecdot(left, left) / ((len(t_s) - 2) * square)), unsure / seconds)
     return Trend(rate, error, rate * seconds, error * seconds)
 
 

@@ -1,0 +1,58 @@
+"""A slow swing from turn to turn: its logarithmic decrement needs a few periods, and none of the same length."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from haploop.launch.stability.traces import Trend, trend_at
+
+# So many swings, each half a period, tell how they change, and how surely.
+_LEAST = 6
+# A turn counts after a way back of this share of the way before.
+_BACK = 0.3
+
+
+class Turns(NamedTuple):
+    """The swings of a trace, each from one turn to the next.
+
+    Attributes:
+        trend: growth over the second half of the trace.
+        first_m, last_m: of the first swing, and the mean of the last two.
+        frequency_Hz: over the second half.
+    """
+
+    trend: Trend
+    first_m: float
+    last_m: float
+    frequency_Hz: float
+
+
+def turns_of(x: np.ndarray, rate: float) -> Turns | None:
+    """Returns the swings of x, shape (ticks,), at so many ticks a second; None of fewer than 6 in its second half."""
+    ticks, at = _turns(x)
+    begins = int(np.searchsorted(ticks, len(x) // 2))
+    swings_m = np.abs(np.diff(at))
+    if len(swings_m) - begins < _LEAST:
+        return None
+    middles_s = (ticks[begins:-1] + ticks[begins + 1 :]) / 2.0 / rate
+    frequency_Hz = (len(ticks) - 1 - begins) / 2.0 / (ticks[-1] - ticks[begins]) * rate
+    last_m = float(swings_m[-2:].mean())
+    found = trend_at(swings_m[begins:], middles_s - middles_s.mean(), len(x) / 2.0 / rate)
+    return Turns(found, float(swings_m[0]), last_m, float(frequency_Hz))
+
+
+def _turns(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns the ticks at which x turns, and x there, without its ends; what goes back by little is no turn."""
+    moving = np.flatnonzero(np.diff(x))
+    ways = np.sign(np.diff(x)[moving])
+    extremes = moving[1:][ways[1:] != ways[:-1]]
+    kept: list[int] = []
+    for tick in extremes.tolist():
+        if len(kept) > 1 and (x[tick] - x[kept[-1]]) * (x[kept[-1]] - x[kept[-2]]) > 0.0:
+            kept[-1] = tick
+        elif len(kept) < 2 or abs(x[tick] - x[kept[-1]]) > _BACK * abs(x[kept[-1]] - x[kept[-2]]):
+            kept.append(tick)
+    ticks = np.array(kept, int)
+    return ticks, x[ticks]
