@@ -11,6 +11,7 @@ from haploop.launch.stability.judge import judge
 from haploop.launch.stability.looks import is_smooth
 from haploop.protocol.scene.effects import Friction
 from helpers.runs.judged import ended, found
+from helpers.scenes import wild_loops
 from helpers.scenes.least import scene
 from helpers.scenes.pressed import PLAIN, pressed
 from helpers.scenes.unseen_loops import drawn
@@ -132,6 +133,14 @@ def test_a_chatter_of_the_encoder_at_a_shipped_device_is_no_rest():
         )
     )
     assert finding.word != "steady"
+
+
+@pytest.mark.slow
+def test_what_dies_on_counts_that_still_move_is_no_rest():
+    """A swing of 2.6 um at 18 Hz, unfelt, that dies within 2 s leaves 0.36 um at 305 Hz, which is felt."""
+    loop = wild_loops.drawn(194)
+    assert loop
+    assert found(loop).word == "limit-cycle"
 
 
 def test_a_swing_that_decays_by_an_element_that_switches_behind_an_encoder_is_not_known_to_die():

@@ -149,3 +149,12 @@ def test_turns_of_something_faster_do_not_tell_how_a_slow_swing_goes_on():
     assert decide(swing_of(slow, 1000.0), last=True).word == "steady"
     fast = 3.5e-3 * np.exp(0.02 * t) * np.sin(2 * np.pi * 5.0 * t)
     assert decide(swing_of(slow + fast, 1000.0), last=True).word not in ("steady", "limit-cycle")
+
+
+@pytest.mark.parametrize(("count_m", "word"), [(1e-6, "growing"), (1e-5, "undecided")])
+def test_a_chatter_within_the_counts_of_an_encoder_is_not_said_to_grow_for_good_before_the_last_look(count_m, word):
+    t, one = np.arange(8_000) / 1000.0, np.ones(1)
+    x = 3e-6 * np.exp(0.05 * t) * np.sin(2 * np.pi * 100.0 * t)[None]
+    [swing] = measure(Pushed(x, x, x, one, count_m * one, one > 0, one > 0, one > 0), 1000.0)
+    assert decide(swing, last=False).word == word
+    assert decide(swing, last=True).word == "growing"
