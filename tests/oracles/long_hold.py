@@ -185,12 +185,14 @@ class Loops:
         z[:, 7] = hand
         for flow, is_old in self._pieces:
             z[:, 6] = np.clip(np.where(is_old, old, new), -self._most, self._most)
+            stood, at = z[:, 3] == 0.0, z[:, 0]
             z = np.matmul(flow, z[:, :, None])[:, :, 0]
             if self._rubs:
                 before = z[:, 3].copy()
                 most = self._friction * STEP_S / self._first_mass
                 z[:, 3] = np.sign(before) * np.maximum(np.abs(before) - most, 0.0)
                 z[:, 0] += (z[:, 3] - before) * STEP_S / 2.0
+                z[:, 0] = np.where(stood & (z[:, 3] == 0.0), at, z[:, 0])  # or it would creep
         self._x, self._v, self._a = x, v, a
         if np.any(waits):
             z[waits] = self._start[waits]
