@@ -66,10 +66,11 @@ def make_10(work: Work) -> list[Finding]:
     *others, uni = (most[kind] for kind in KINDS[1:])
     is_first = all(beats(uni, one) for one in others)
     by_run = {kind: in_words(steady_to_run(work, setup, kind)) for kind in KINDS}
+    same, listed = {*by_run.values()}, ", ".join(f"{SHORT[kind]} {told}" for kind, told in by_run.items())
     computed = {
         "starts": len(uni.steady),
         "bears": bears,
-        "by_run": ", ".join(f"{SHORT[kind]} {told}" for kind, told in by_run.items()),
+        "by_run": listed if len(same) > 1 else f"{same.pop()} with each",
     }
     work.conclude("first" if is_first else "not_first", supports=is_first, **computed)
     work.notes = [_words(work, most, by_run), _why(work, setup)]
