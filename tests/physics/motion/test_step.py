@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
-from haploop.plant.motion.transition import FohTransition, gramian, make_foh_transition, motion_integrals, natural_rate
+from haploop.plant.motion.transition import (
+    FohTransition,
+    gramian,
+    make_foh_transition,
+    motion_integrals,
+    natural_rate,
+    transition_minus_identity,
+)
 from oracles.decimal_flow import flow_minus_identity
 
 H = 1e-4
@@ -131,3 +138,19 @@ def test_a_gramian_solves_its_lyapunov_equation():
         p = expm(a * 0.05)
         expected = p.T @ q @ p - q
         assert np.abs(a.T @ w + w @ a - expected).max() <= 1e-10 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("fastest", [1e-3, 0.4, 30.0, 3000.0])
+def test_all_halvings_of_a_step_at_once_have_the_bits_of_each_by_itself(fastest):
+    rng, levels, duration = np.random.default_rng(5), np.array([7, 0, 3, 40]), np.longdouble(0.05)
+    rates = rng.normal(size=(5, 5)).astype(np.longdouble) * fastest
+    weights = np.stack([np.outer(row, row) for row in rng.normal(size=(2, 5))])
+    moved, forms = (
+        transition_minus_identity(rates, duration, levels),
+        gramian(rates, weights, duration, levels),
+    )
+    assert np.array_equal(gramian(rates, weights[1], duration, levels), forms[:, 1])
+    for level, of_this, form in zip(levels.tolist(), moved, forms, strict=True):
+        lasts = duration / np.longdouble(2) ** level
+        assert np.array_equal(of_this, transition_minus_identity(rates, lasts))
+        assert np.array_equal(form, gramian(rates, weights, lasts))

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from haploop.logger.books.buffers import PIECES
 from haploop.plant.chain.chain import Chain
-from haploop.plant.chain.transition import ChainIntegrals, make_tables
+from haploop.plant.chain.transition import ChainIntegrals, make_tables, of_device
 from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.trees import tree_select
 
 Columns = dict[str, np.ndarray]
 # Those of a batch; with friction ``pieces``, a list of (place of a member, columns of its pieces), stands beside them.
 BatchColumns = dict[str, Any]
-# (forms of all products, form of the lag integral) by level and by whether body 0 is stuck.
-Made = dict[tuple[int, bool], tuple[np.ndarray, np.ndarray]]
+# (forms of all products, shape (products, rates, rates); form of the lag integral, shape (rates,)) by kind.
+Made = dict[int, tuple[np.ndarray, np.ndarray]]
 # A part of a step is counted in 2^-62 of it: whole numbers, whose sums over many steps may overflow unharmed.
 _FINEST = 62
 # So many segments of a kind are integrated by themselves; fewer together with others, each by coefficients of its own.
@@ -143,9 +142,9 @@ def _elapsed(step: np.ndarray, level: np.ndarray) -> np.ndarray:
     return (over - over[first]).astype(float) / 2.0**_FINEST
 
 
-@lru_cache(maxsize=64)
-def _made_of(_chain: str) -> Made:
-    """Returns the forms made so far of a chain, written out: runs of one device in one process share them."""
+@of_device
+def _made_of(_chain: Chain, _step_s: float) -> Made:
+    """Returns the forms made so far of a chain: runs of one device in one process share them."""
     return {}
 
 
@@ -172,9 +171,9 @@ class ChainForms:
         if of_batch:
             rates, *forms = make_tables(lambda one: _tables(one, step_s), chain, has_members=True)
             self._real: Any = np.float64
-            self._rates, self._made[0, False] = {False: rates}, (forms[0], forms[1])
+            self._rates, self._made[0] = {False: rates}, (forms[0], forms[1])
             return
-        self._made = _made_of(repr((replace(chain, spring=(chain.spring[0], 0.0), start=(0.0, 0.0)), step_s)))
+        self._made = _made_of(chain, step_s)
         self._flows = {stuck: ChainIntegrals(chain, step_s, stuck) for stuck in (False, True)}
         self._real = chain.real_for(step_s)
         self._rates = {stuck: chain.rates(stuck).astype(self._real) for stuck in (False, True)}
@@ -205,8 +204,9 @@ class ChainForms:
         groups, result = segments.groups(), np.empty((len(self.names), *force.shape))
         if any(not isinstance(which, slice) for *_, which in groups):  # a mask selects from whole arrays alone
             acting, rise = [np.broadcast_to(of, force.shape) for of in acting], np.broadcast_to(rise, force.shape)
+        forms = self.forms([kind for kinds, *_ in groups for kind in kinds.tolist()])
         for kinds, of, which in groups:
-            made = [(self._rates[kind % 2 == 1], *self.forms(kind // 2, kind % 2 == 1)) for kind in kinds.tolist()]
+            made = [(self._rates[kind % 2 == 1], *forms[kind]) for kind in kinds.tolist()]
             rates, products, lag_integral = made[0]
             if len(made) > 1:
                 rates, products, lag_integral = (np.stack(part, axis=-1)[..., of] for part in zip(*made, strict=True))
@@ -216,15 +216,16 @@ class ChainForms:
             result[-1, which] = _sum_of(lag_integral, w)
         return result
 
-    def forms(self, level: int, stuck: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Returns (forms of all products, shape (products, rates, rates); form of the lag integral, shape (rates,))."""
-        if (level, stuck) not in self._made:
-            flow = self._flows[stuck]
-            factors, *pairs = zip(*self._products, strict=True)
-            forms = np.array(factors)[:, None, None] * flow.products([*zip(*pairs, strict=True)], level)
-            made = forms, flow.lag(self._last, level)
-            self._made[level, stuck] = made[0].astype(self._real), made[1].astype(self._real)
-        return self._made[level, stuck]
+    def forms(self, kinds: Iterable[int]) -> Made:
+        """Returns the forms made so far, and of these kinds of segments; those of all levels are made at once."""
+        missing = {*kinds} - self._made.keys()
+        for stuck in {kind % 2 for kind in missing}:
+            of, flow = sorted(kind for kind in missing if kind % 2 == stuck), self._flows[stuck == 1]
+            levels, (factors, *pairs) = np.array(of) // 2, zip(*self._products, strict=True)
+            products = np.array(factors)[:, None, None] * flow.products([*zip(*pairs, strict=True)], levels)
+            made = products.astype(self._real), flow.lag(self._last, levels).astype(self._real)
+            self._made |= zip(of, zip(*made, strict=True), strict=True)
+        return self._made
 
     def for_loops(self, kinds: np.ndarray, loops: Any) -> list[np.ndarray] | None:
         """Returns what the loops of machine code need of some kinds and whole steps; None where floats are too short.
@@ -234,10 +235,8 @@ class ChainForms:
         """
         if self._of_batch or self._real is not np.float64:
             return None
-        for kind in {0, 1, *kinds.tolist()}:
-            self.forms(kind // 2, kind % 2 == 1)
-        if not self._of_loops or len(self._of_loops[1]) != len(self._made):
-            forms = {2 * level + stuck: forms for (level, stuck), forms in self._made.items()}
+        forms = self.forms([0, 1, *kinds.tolist()])
+        if not self._of_loops or len(self._of_loops[1]) != len(forms):
             products, lags = (np.stack(part) for part in zip(*forms.values(), strict=True))
             which = np.zeros(max(forms) + 1, np.int64)
             which[[*forms]] = np.arange(len(forms))
@@ -251,7 +250,7 @@ class ChainForms:
 
 
 def _tables(chain: Chain, step_s: float) -> tuple[np.ndarray, ...]:
-    return chain.rates().astype(float), *ChainForms(chain, step_s).forms(level=0, stuck=False)
+    return chain.rates().astype(float), *ChainForms(chain, step_s).forms([0])[0]
 
 
 def _sum_of(factors: np.ndarray, columns: Sequence[np.ndarray]) -> np.ndarray:

@@ -80,6 +80,9 @@ class Chain:
         start = device.position, device.velocity
         return cls(tuple(bodies), tuple(masses), grounded, tuple(links), spring, actuator_rate, sensor, start)
 
+    def __hash__(self) -> int:
+        return hash(repr(self))  # a dict among the fields has no hash
+
     @property
     def count(self) -> int:
         """N, the number of bodies."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,9 +16,19 @@ from haploop.protocol.trees import tree_leaves, tree_select, tree_unflatten
 
 # Returns the load in N at the steps first ... last - 1.
 Loads = Callable[[int, int], np.ndarray]
+Made = TypeVar("Made")
 _wide = np.longdouble
 # Responses to the load are made for this many intervals at a time, on a fixed grid; in a batch for fewer.
 PIECE_TICKS, _PIECE_TICKS_OF_A_BATCH = 256, 8
+
+
+def of_device(make: Callable[..., Made]) -> Callable[..., Made]:
+    """Returns ``make``, from a chain of floats and what else it needs, that keeps what it made of the last 64 of them.
+
+    It may not look at the start and the rest: chains that differ in these alone share it.
+    """
+    kept = lru_cache(maxsize=64)(make)
+    return lambda chain, *of: kept(replace(chain, spring=(chain.spring[0], 0.0), start=(0.0, 0.0)), *of)
 
 
 class ChainTransition:
@@ -38,25 +49,25 @@ class ChainTransition:
         self._step_s = _wide(step_s)
         one = transition_minus_identity(self._rates, self._step_s)
         self.step = self._unscaled(one)
-        increment, held = one, []
-        for _ in range(steps):
-            held.append(self._unscaled(increment)[: self._size + 2])
-            increment = increment + one + one @ increment
-        self.held = np.stack(held, axis=1)
+        increments = [one]
+        for _ in range(steps - 1):
+            increments.append(increments[-1] + one + one @ increments[-1])
+        self.held = np.ascontiguousarray(self._unscaled(np.stack(increments))[:, : self._size + 2].swapaxes(0, 1))
 
-    def halves(self, levels: int) -> list[Matrix]:
-        """Returns the transitions over h, h/2, ... h/2^levels, shape (states + 4, states); rise is of a whole step."""
-        increment = transition_minus_identity(self._rates, self._step_s / _wide(2) ** levels)
-        table = [self._unscaled(increment)]
+    def halves(self, levels: int) -> Matrix:
+        """Returns the transitions over h, h/2, ... h/2^levels; rise is of a whole step.
+
+        Shape (levels + 1, states + 4, states).
+        """
+        increments = [transition_minus_identity(self._rates, self._step_s / _wide(2) ** levels)]
         for _ in range(levels):
-            increment = 2.0 * increment + increment @ increment
-            table.append(self._unscaled(increment))
-        return table[::-1]
+            increments.append(2.0 * increments[-1] + increments[-1] @ increments[-1])
+        return self._unscaled(np.stack(increments[::-1]))
 
     def _unscaled(self, increment: Matrix) -> Matrix:
         """Returns what (z, command, friction, load, rise) add to the states, transposed."""
-        rows = increment[: self._size] * self._scales / self._scales[: self._size, None]
-        return np.ascontiguousarray(rows.T).astype(float)
+        rows = increment[..., : self._size, :] * self._scales / self._scales[: self._size, None]
+        return np.ascontiguousarray(rows.swapaxes(-1, -2)).astype(float)
 
 
 def scaled_rates(chain: Chain, step_s: float, stuck: bool) -> Matrix:
@@ -69,6 +80,18 @@ def scaled_rates(chain: Chain, step_s: float, stuck: bool) -> Matrix:
     return scales[:, None] * rates / scales
 
 
+@of_device
+def moves_of(chain: Chain, step_s: float, steps: int, stuck: bool) -> tuple[Matrix, Matrix]:
+    """Returns ``step`` and ``held`` of the transition."""
+    transition = ChainTransition(chain, step_s, steps, stuck)
+    return transition.step, transition.held
+
+
+@of_device
+def halves_of(chain: Chain, step_s: float, levels: int, stuck: bool) -> Matrix:
+    return ChainTransition(chain, step_s, 1, stuck).halves(levels)
+
+
 class ChainResponse:
     """Transitions, and the forced (zero-state) response to the load alone, of intervals of so many steps: a cache.
 
@@ -78,11 +101,9 @@ class ChainResponse:
     def __init__(
         self, chain: Chain, step_s: float, steps: int, loads: Loads, *, stuck: bool, has_members: bool
     ) -> None:
-        def made(chain: Chain) -> tuple[np.ndarray, ...]:
-            transition = ChainTransition(chain, step_s, steps, stuck)
-            return transition.step, transition.held
-
-        self.step, self.held = make_tables(made, chain, has_members=has_members)
+        self.step, self.held = make_tables(
+            lambda one: moves_of(one, step_s, steps, stuck), chain, has_members=has_members
+        )
         self._loads, self._n = loads, steps
         self._piece_ticks = _PIECE_TICKS_OF_A_BATCH if has_members else PIECE_TICKS
         self.of_piece = lru_cache(maxsize=1)(self._made)
@@ -129,27 +150,32 @@ class ChainIntegrals:
         self._rates[: self._size, -1] = full[: self._size, self._size + 2] / self._step_s
         self._scales = scales
 
-    def products(self, pairs: Sequence[tuple[np.ndarray, np.ndarray]], level: int = 0) -> Matrix:
+    def products(self, pairs: Sequence[tuple[np.ndarray, np.ndarray]], levels: np.ndarray) -> Matrix:
         """Returns symmetric Q, unscaled, with integral (left.w)(right.w) dt = w' Q w over h/2^level, one of each pair.
 
-        Shape (pairs, states + 1, states + 1).
+        Shape (levels, pairs, states + 1, states + 1).
         """
         weights = []
         for left, right in pairs:
             a, b = (np.append(row, 0.0) / self._scales for row in (left, right))
             weights.append((np.outer(a, b) + np.outer(b, a)) / 2.0)
-        forms = gramian(self._rates, np.stack(weights), self._step_s / _wide(2) ** level)
+        forms = gramian(self._rates, np.stack(weights), self._step_s, levels)
         return forms * np.outer(self._scales, self._scales)
 
-    def lag(self, velocity: np.ndarray, level: int = 0) -> np.ndarray:
-        """Returns l with integral (t - t_end/2)/t_end velocity.w dt = l . w over h/2^level."""
-        n, end = len(self._rates), self._step_s / _wide(2) ** level
+    def lag(self, velocity: np.ndarray, levels: np.ndarray) -> np.ndarray:
+        """Returns l with integral (t - t_end/2)/t_end velocity.w dt = l . w over h/2^level.
+
+        Shape (levels, states + 1).
+        """
+        n = len(self._rates)
         extended = np.zeros((n + 2, n + 2), _wide)
         extended[:n, :n] = self._rates
         extended[n, :n] = np.append(velocity, 0.0) / self._scales
-        extended[n + 1, n] = 1.0 / end
-        increment = transition_minus_identity(extended, end)
-        return (increment[n, :n] / 2.0 - increment[n + 1, :n]) * self._scales
+        extended[n + 1, n] = 1.0 / self._step_s
+        half = transition_minus_identity(extended, self._step_s, levels + 1)
+        increment = 2.0 * half + half @ half
+        later = increment[:, n + 1, :n] * _wide(2) ** levels[:, None]
+        return (increment[:, n, :n] / 2.0 - later) * self._scales
 
 
 def make_tables(

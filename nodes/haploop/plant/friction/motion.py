@@ -8,7 +8,7 @@ import numpy as np
 
 from haploop.plant.chain.history import ChainState, Interval, StickSlipState
 from haploop.plant.chain.motion import ChainMotion, follow
-from haploop.plant.chain.transition import PIECE_TICKS, ChainTransition
+from haploop.plant.chain.transition import PIECE_TICKS, halves_of
 from haploop.plant.friction.stick_slip import (
     Friction,
     RubbingHistory,
@@ -53,9 +53,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         self._piece = -1
         self._halving, self._whole_steps = halving_of(self.chain, self._step_s), goes_by_whole_steps(scene)
         levels = self._halving.finest + 1
-        self._tables = [
-            ChainTransition(self.chain, self._step_s, self._n, stuck).halves(levels) for stuck in (False, True)
-        ]
+        self._tables = [halves_of(self.chain, self._step_s, levels, stuck) for stuck in (False, True)]
         if loops := self.loops_for(time.ticks):
             self._course = LOOPS.module().Course(loops, self.friction, self._n)
 

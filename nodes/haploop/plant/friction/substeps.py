@@ -10,6 +10,7 @@ import numpy as np
 
 from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.history import StickSlipState
+from haploop.plant.chain.transition import of_device
 from haploop.plant.friction.stick_slip import (
     Row,
     StickSlip,
@@ -251,6 +252,7 @@ def goes_by_whole_steps(scene: Scene) -> bool:
     return bool(is_slow and scene.friction and not scene.friction.stribeck_velocity)
 
 
+@of_device
 def parts_of_a_step(chain: Chain, step_s: float) -> int:
     """Returns into how many pieces, a power of two, a plant step is cut so that none is longer than half a radian."""
     rates = [chain.rates(stuck)[:, : len(chain.states)].astype(float) for stuck in (False, True)]

@@ -15,9 +15,10 @@ Real = float | np.floating
 
 # Coefficients are made once and used for every step, so their error adds up: they are computed in the widest float.
 _wide = np.longdouble
+_WHOLE = np.array(0)
 
 
-def transition_minus_identity(rates: Matrix, duration: Real) -> Matrix:
+def transition_minus_identity(rates: Matrix, duration: Real, levels: Matrix = _WHOLE) -> Matrix:
     """Returns e^{A t} - I, accurate in every entry however small A t is.
 
     With E = e^{A h} - I on a step so short that |A h| <= 1/2, the Taylor series converges in a few terms and loses
@@ -26,19 +27,27 @@ def transition_minus_identity(rates: Matrix, duration: Real) -> Matrix:
 
     Args:
         rates: A, shape (n, n), 1/s.
-        duration: t, s.
+        duration: 2^level t, s.
+        levels: of t, shape (...); all from one series, as half the step has its terms times a power of 2, to the bit.
+
+    Returns:
+        Shape (..., n, n).
     """
-    scaled, doublings = _short_step(rates, duration)
-    term = increment = scaled.copy()
+    step, doublings = _short_step(rates, duration)
+    term = scaled = rates * step
+    shrunk = part = _parts(levels - doublings, scaled)
+    increment = term * part
     for order in range(2, 24):
-        term = term @ scaled / order
-        increment = increment + term
-    for _ in range(doublings):
-        increment = 2.0 * increment + increment @ increment
+        term, shrunk = term @ scaled / order, shrunk * part
+        increment = increment + term * shrunk
+    doubled = _first(increment, levels, scaled)
+    for level in range(doublings)[::-1]:
+        doubled = 2.0 * doubled + doubled @ doubled
+        increment = np.where(_beside(levels, scaled) <= level, doubled, increment)
     return increment
 
 
-def gramian(rates: Matrix, weight: Matrix, duration: Real) -> Matrix:
+def gramian(rates: Matrix, weight: Matrix, duration: Real, levels: Matrix = _WHOLE) -> Matrix:
     """Returns W = integral over [0, t] of e^{A' s} Q e^{A s} ds.
 
     The step is halved until |A h| <= 1/2, and the result doubled back.
@@ -48,28 +57,50 @@ def gramian(rates: Matrix, weight: Matrix, duration: Real) -> Matrix:
 
     Args:
         rates: A, shape (n, n), 1/s.
-        weight: Q, symmetric to the bit, shape (n, n), or several, shape (..., n, n); so is W.
-        duration: t, s.
+        weight: Q, symmetric to the bit, shape (n, n), or several, shape (weights, n, n).
+        duration: 2^level t, s.
+        levels: of t, shape (...); see ``transition_minus_identity``.
+
+    Returns:
+        Shape (..., n, n), or (..., weights, n, n).
     """
-    scaled, doublings = _short_step(rates, duration)
-    step = duration / _wide(2) ** doublings
-    derivative, total = weight, weight * step
+    step, doublings = _short_step(rates, duration)
+    scaled, derivative = rates * step, weight
+    shrunk = part = _parts(levels - doublings, weight)
+    total = weight * step * part
     for order in range(2, 34):
         moved = scaled.T @ derivative  # whose transpose is D A
-        derivative = (moved + moved.swapaxes(-1, -2)) / order
-        total = total + derivative * step
-    increment = transition_minus_identity(rates, step)
-    for _ in range(doublings):
-        moved = total @ increment
-        total = 2.0 * total + moved + moved.swapaxes(-1, -2) + increment.T @ moved
+        derivative, shrunk = (moved + moved.swapaxes(-1, -2)) / order, shrunk * part
+        total = total + derivative * step * shrunk
+    increment, doubled = transition_minus_identity(rates, step), _first(total, levels, weight)
+    for level in range(doublings)[::-1]:
+        moved = doubled @ increment
+        doubled = 2.0 * doubled + moved + moved.swapaxes(-1, -2) + increment.T @ moved
         increment = 2.0 * increment + increment @ increment
+        total = np.where(_beside(levels, weight) <= level, doubled, total)
     return (total + total.swapaxes(-1, -2)) / 2.0
 
 
-def _short_step(rates: Matrix, duration: Real) -> tuple[Matrix, int]:
+def _short_step(rates: Matrix, duration: Real) -> tuple[Any, int]:
+    """Returns a step for the series, and how often it is doubled up to the duration."""
     size = np.abs(rates * duration).sum(axis=1).max()
     doublings = max(0, int(np.ceil(np.log2(size))) + 1) if size > 0.5 else 0
-    return rates * (duration / _wide(2) ** doublings), doublings
+    return duration / _wide(2) ** doublings, doublings
+
+
+def _beside(levels: Matrix, of: Matrix) -> Matrix:
+    """Returns levels with an axis for each of a matrix, or of several."""
+    return levels.reshape(*levels.shape, *[1] * of.ndim)
+
+
+def _parts(levels: Matrix, of: Matrix) -> Matrix:
+    """Returns which part of the step of the series is left at each level below it; all of it above."""
+    return _wide(0.5) ** np.maximum(_beside(levels, of), 0)
+
+
+def _first(series: Matrix, levels: Matrix, of: Matrix) -> Matrix:
+    """Returns the sum of the series over its whole step, where the least level is one that it is doubled for."""
+    return series.reshape(-1, *of.shape)[levels.argmin()]
 
 
 class FohTransition(NamedTuple):
