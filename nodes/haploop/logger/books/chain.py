@@ -89,7 +89,7 @@ class ChainBooks:
         counts[places] = some
         pieces = np.stack([of_pieces.get(PIECES + name, none) for name in (*names, "step", "level", "snap_J")])
         pieces[len(names)] -= first_step
-        kinds = np.unique((2.0 * pieces[-2] + pieces[len(names) - 1]).astype(np.int64))
+        kinds = np.flatnonzero(np.bincount((2.0 * pieces[-2] + pieces[len(names) - 1]).astype(np.int64)))
         if (forms := self._forms.for_loops(kinds, loops)) is None:
             return None
         rows = np.empty((len(names) + 3, steps + 1, members))

@@ -26,7 +26,7 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
 
     def __init__(self, scene: Scene, time: Timebase, members: int) -> None:
         self._one = FrictionMotion(tree_member(scene, 0), time)
-        self._pieces: list[tuple[int, Any]] = []
+        self._pieces: list[tuple[np.ndarray, np.ndarray]] = []
         super().__init__(scene, time, members)
         self._stick_slip = StickSlip.of(self.chain, self.friction, self._step_s)
         self._clamped = self._response(stuck=True)
@@ -97,7 +97,7 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         one.advance_under(loads, forced, tick, holds)
         interval.course[..., place] = one.take_interval().course
         if pieces := one.take_pieces():
-            self._pieces.append((place, np.array(pieces)))
+            self._pieces.append((np.full(len(pieces), place), np.array(pieces)))
         assert one.state.mode
         return one.state.mode
 
@@ -106,12 +106,13 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
 
         These are (members that have any, how many each, ``pieces_record`` of all of them one after the other).
         """
-        pieces, self._pieces = sorted(self._pieces, key=lambda piece: piece[0]), []
+        pieces, self._pieces = self._pieces, []
         record = super().take_record(tick, positions_only=positions_only)
         if positions_only:
             return record
-        members, tables = np.array([place for place, _ in pieces], np.intp), [rows for _, rows in pieces]
-        counts = np.bincount(members, [len(rows) for rows in tables]).astype(np.intp)
+        members = np.concatenate([np.zeros(0, np.intp), *(of for of, _ in pieces)])
+        order, counts = np.argsort(members, kind="stable"), np.bincount(members)
+        tables = [np.concatenate([rows for _, rows in pieces])[order]] if pieces else []
         places = np.flatnonzero(counts)
         return record | {"pieces": (places, counts[places], pieces_record(self.chain, tables))}
 

@@ -34,6 +34,8 @@ _lost_in = _code.compiled(motion.lost_in, inlined=True)
 _PIECES = 16_384
 # Members taken out of a batch at a time: what lies side by side in memory is then read and written together.
 _TOGETHER = 8
+# (member of each piece, rows of ``pieces_record``).
+Pieces = tuple[np.ndarray, np.ndarray]
 
 
 @_code.compiled
@@ -207,7 +209,7 @@ class Loops:
     def advance(
         self, course: np.ndarray, forced: tuple[np.ndarray, np.ndarray], loads: np.ndarray, holds: list[Hold],
         first_step: int, modes: np.ndarray, laws: np.ndarray,
-    ) -> list[tuple[int, np.ndarray]] | None:  # fmt: skip
+    ) -> list[Pieces] | None:  # fmt: skip
         """Moves all members through an interval, whose first plant step is numbered; changes their modes in place.
 
         Args:
@@ -219,11 +221,11 @@ class Loops:
             laws: the numbers of ``Friction``, shape (4, 1 or members).
 
         Returns:
-            (member, rows of its pieces) of those that have any; None where one switches too often for the loops: the
-            interval is then to be moved by other means.
+            Their pieces, member after member; None where one switches too often for the loops: the interval is then to
+            be moved by other means.
         """
         ends = _ends_of(tuple([hold[0] for hold in holds]))
-        found, pieces, begun, members = list[tuple[int, np.ndarray]](), self.pieces, 0, course.shape[2]
+        found, pieces, begun, members = list[Pieces](), self.pieces, 0, course.shape[2]
         upto = np.empty(members, np.int64)
         while begun < members:
             pieces[-1, 0] = 0.0
@@ -231,11 +233,8 @@ class Loops:
             if member == begun:
                 return None
             if count := int(pieces[-1, 0]):
-                rows, first = pieces[:count].copy(), 0
-                for place, end in enumerate(upto[begun:member].tolist(), begun):
-                    if end > first:
-                        found.append((place, rows[first:end]))
-                        first = end
+                counts = np.diff(upto[begun:member], prepend=0)
+                found.append((np.repeat(np.arange(begun, member), counts), pieces[:count].copy()))
             begun = member
         return found
 
