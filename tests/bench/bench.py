@@ -10,6 +10,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 from history import keep
@@ -37,11 +38,14 @@ def _in_process_us(seconds: float) -> float:
     return (time.perf_counter() - began) / summary["ticks"] * 1e6
 
 
-def _realistic_us(seconds: float, *, by_loops: bool, members: int = 1) -> Callable[[], float]:
+def _realistic_us(
+    seconds: float, *, by_loops: bool, members: int = 1, key: str = "wall.stiffness", most: float = 1500.0
+) -> Callable[[], float]:
     """As ``_in_process_us`` with cable, grip and friction, the hand tapping: by loops of machine code, or without.
 
-    Of so many members, each with a wall of its own, in one batch.
+    Of so many members, each with a number of its own, which no repeat had before: in one batch where it is the wall's.
     """
+    repeats = count()
 
     def measure() -> float:
         for loops in (motion.LOOPS, segments.LOOPS):
@@ -50,8 +54,8 @@ def _realistic_us(seconds: float, *, by_loops: bool, members: int = 1) -> Callab
         settings = [f"duration={seconds}", "run.log=none", "run.verdict=window"]
         whole, kinds = load(SCENE.parent / "all_effects.toml", settings), registry()
         scene = replace(whole, jitter=None, loss=None, noise=None, actuator=None)
-        walls_N_m = [100.0 + 1400.0 * place / members for place in range(members)]
-        scenes = [with_value(scene, "wall.stiffness", stiffness) for stiffness in walls_N_m]
+        highest = most * (1.0 - 1e-6 * next(repeats))
+        scenes = [with_value(scene, key, highest * (1.0 - 0.9 * place / members)) for place in range(members)]
         began = time.perf_counter()
         summaries = run_batch(scenes, kinds) if members > 1 else [run_in_process(scene, kinds)]
         return (time.perf_counter() - began) / sum(summary["ticks"] for summary in summaries) * 1e6
@@ -90,6 +94,12 @@ ROWS: dict[str, tuple[Callable[[], float], str, str, float]] = {
     "the same with cable, grip, friction": (_realistic_us(10.0, by_loops=False), "us/tick", "plain loop", 0.0),
     "the same by numba's loops": (_realistic_us(10.0, by_loops=True), "us/tick", "plain loop", 0.0),
     "128 of them in one batch": (_realistic_us(1.0, by_loops=True, members=128), "us/tick", "plain loop", 0.0),
+    "20 devices, each alone": (
+        _realistic_us(1.0, by_loops=True, members=20, key="device.mass", most=0.2),
+        "us/tick",
+        "plain loop",
+        0.0,
+    ),
     "haploop run of one tick, start to end": (_first_tick_s, "s", "", 0.0),
 }
 
