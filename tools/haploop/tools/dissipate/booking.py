@@ -19,6 +19,9 @@ from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.force_book import ForceBook, ForceRows
 from haploop.tools.dissipate.samples import Floats, Samples
 
+# Estimates begin at rest: the jump of the first samples is no noise.
+_FIRST = 4
+
 
 class Booked(NamedTuple):
     """The books at some samples: t_s and x_m of shape (samples,), the others (elements, samples).
@@ -57,6 +60,9 @@ class Booking:
         taken_J, given_J: sum of the gains of the true books over the periods in which they gained, and of the losses
             over the others, shape (rows,), a row an element and one more for a recorded force.
         strongest_N: the largest force of each, shape (rows,).
+        fast_share: share of each one's mean square force that is faster than a quarter of the sampling rate, shape
+            (rows,); the line at a frequency f counts as sin(pi f T)^2, and what is left as slow. Of white noise in the
+            positions it is 0.75 in a damper's force by backward differences, and 0.83 in an inertia's.
     """
 
     def __init__(
@@ -78,7 +84,7 @@ class Booking:
         self.force = ForceBook(period_s, delay_s) if has_force else None
         self._sums = no_sums(2 * self._count)
         self._events = _wall_events(scene, self._time)
-        self.taken_J, self.given_J, self.strongest_N = np.zeros((3, self._count))
+        self.taken_J, self.given_J, self.strongest_N, self._fast_N2, self._slow_N2 = np.zeros((5, self._count))
 
     def add(self, piece: Samples) -> Booked:
         """Books a piece; returns the books at its samples.
@@ -105,6 +111,9 @@ class Booking:
         self._last_x, self._last_true_x = piece.x_m[-1:], piece.true_x_m[-1:]
         self._last_between = None if piece.between_x_m is None else piece.between_x_m[-1:]
         self.strongest_N = np.fmax(self.strongest_N, np.abs(forces).max(axis=1))
+        some = answer[:, _FIRST if piece.begins else 0 :]
+        self._fast_N2 += (np.diff(some) ** 2).sum(axis=1)
+        self._slow_N2 += ((some[:, 1:] + some[:, :-1]) ** 2).sum(axis=1)
         totals = self._add(added)[:, 1:]
         sampled, true = np.split(totals, 2)
         force = self.force.add(piece, v, added[-1], true[-1]) if self.force else None
@@ -122,6 +131,11 @@ class Booking:
         if self.force:
             self.force.finish(float(held[-1, 0]))
         self._add(np.vstack([np.zeros_like(held), held]))
+
+    @property
+    def fast_share(self) -> Floats:
+        whole = self._fast_N2 + self._slow_N2
+        return np.divide(self._fast_N2, whole, out=np.zeros_like(whole), where=whole > 0.0)
 
     @property
     def sampled_J(self) -> Floats:

@@ -90,6 +90,7 @@ class ElementOutcome:
         label: kind and parameters in short: "damping 2.7 N s/m", "my element (mass 1.80 g, damping 0.1 N s/m)".
         sampled_J, true_J: its books at the end; positive: taken out of the device.
         taken_J, given_J: energy taken in the periods in which it dissipates, and given back in the others (true books).
+        fast_share: of its mean square force, what is faster than a quarter of the sampling rate, see ``Booking``.
     """
 
     kind: str
@@ -100,6 +101,12 @@ class ElementOutcome:
     taken_J: float
     given_J: float
     strongest_N: float
+    fast_share: float
+
+    @property
+    def is_noise(self) -> bool:
+        """Tells whether much of its force is faster than a buzz at 0.15 of the sampling rate would make it."""
+        return self.fast_share > 0.2
 
 
 @dataclass(frozen=True)
@@ -170,7 +177,14 @@ class Outcome:
 def make_outcome(
     recording: Recording, booking: Booking, trace: Trace, scene: Scene, kinds: Mapping[str, type[Element]]
 ) -> Outcome:
-    columns = (booking.sampled_J, booking.true_J, booking.taken_J, booking.given_J, booking.strongest_N)
+    columns = (
+        booking.sampled_J,
+        booking.true_J,
+        booking.taken_J,
+        booking.given_J,
+        booking.strongest_N,
+        booking.fast_share,
+    )
     books = np.array(columns).T.tolist()
     elements = [
         ElementOutcome(

@@ -33,6 +33,11 @@ _NAIVE = (
     "a thinned-out recording, is not. What is taken out of the device counts as positive. The sum F v T, v that at the "
     "sample (sampled books take the way after it), would say that the force {naive}: off by {off}{share}."
 )
+_NOISE = (
+    "{share} % of the force of {label} is faster than a quarter of the sampling rate. Unless the device buzzed as "
+    "fast, that is noise of the estimates, and so is much of its energy. Low-pass them, as by --set "
+    "acceleration.cutoff=20 or --set velocity.cutoff=50, until the energy no longer depends on it."
+)
 # An inertia above this, kg, is more often a mass in grams: the heaviest device that comes with haploop has 0.2 kg.
 _HEAVY_KG = 0.5
 _HEAVY = '{label}: a mass without a unit is in kg; is that what was meant? 1.8 g is --mass "1.8 g" or --mass 0.0018.'
@@ -76,7 +81,7 @@ def make_row(element: ElementOutcome) -> tuple[str, ...]:
 def conclusion(outcome: Outcome) -> str:
     """Returns who would have dissipated most, and who would have fed the motion; of a force alone its work."""
     if not outcome.elements and outcome.force:
-        return _passivity(outcome.force)
+        return _passivity(outcome)
     best, *others = sorted(outcome.elements, key=lambda element: element.true_J, reverse=True)
     if not any(element.strongest_N for element in outcome.elements):
         return "none of these would have given a force on this motion."
@@ -89,6 +94,8 @@ def conclusion(outcome: Outcome) -> str:
         words += f", {' and '.join(taking)}"
     if others and others[-1].true_J < 0.0:
         words += f"; {others[-1].label} would have fed {amount(-others[-1].true_J, 'J')} into the motion"
+    if noisy := [element.label for element in outcome.elements if element.is_noise]:
+        words += f". Not to be relied on, since much of their force is noise: {', '.join(noisy)}"
     return f"{words}."
 
 
@@ -113,9 +120,14 @@ def note_sentences(outcome: Outcome) -> list[str]:
         _SIZES if len(outcome.elements) > 1 else "",
         _IN_CONTACT if any(element.acts == "in-contact" for element in outcome.scene.dissipation) else "",
         *(_HEAVY.format(label=each.label) for each in outcome.elements if _is_heavy(each)),
+        *(
+            _NOISE.format(share=round(100 * each.fast_share), label=each.label)
+            for each in outcome.elements
+            if each.is_noise
+        ),
     ]
     if force and outcome.elements:
-        said = _passivity(force)
+        said = _passivity(outcome)
         sentences.append(said[:1].upper() + said[1:])
     if force:
         sentences.append(_naive(force))
@@ -131,9 +143,12 @@ def _is_heavy(element: ElementOutcome) -> bool:
     return not isinstance(mass, str) and mass >= _HEAVY_KG
 
 
-def _passivity(force: ForceOutcome) -> str:
+def _passivity(outcome: Outcome) -> str:
+    force = outcome.force
+    assert force
     words = _PASSIVITY[force.passivity].format(excess=amount(force.excess_J, "J"))
-    return f"in all the recorded force {_given_or_taken(force.books.true_J)}; {words}."
+    where = "outside the gaps" if outcome.recording.notes.gaps else "in all"
+    return f"{where} the recorded force {_given_or_taken(force.books.true_J)}; {words}."
 
 
 def _given_or_taken(taken_J: float) -> str:

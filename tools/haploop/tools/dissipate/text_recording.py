@@ -241,7 +241,13 @@ class TextRecording:
         if len(wrong):
             at = int(wrong[0])
             before = t[at - 1] if at else last_s
+            told = f"Line {lines[at]:.0f} of {self._file.path}: the times must increase, but {t[at]:.9g} s follows "
+            if t[at] == before:
+                count = int((steps[wrong] == 0.0).sum())
+                raise RecordingError(
+                    f"{told}itself ({count} such rows in this part of the file). Leave out rows that were written "
+                    "twice; where the clock is coarser than the samples, give their rate with --rate."
+                )
             raise RecordingError(
-                f"Line {lines[at]:.0f} of {self._file.path}: the times must increase, but {t[at]:.9g} s follows "
-                f"{before:.9g} s; sort the rows, or give the rate with --rate if they are in order."
+                f"{told}{before:.9g} s; sort the rows, or give the rate with --rate if they are in order."
             )
