@@ -18,7 +18,8 @@ from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.spec import RunFailed
 from haploop.logger.summary import read as read_summary
 from haploop.tools.cli.app import app
-from helpers.live.launched import PATIENCE_S, wait_for
+from helpers.live.launched import PATIENCE_S, SCENES, wait_for
+from helpers.scenes.brake import source
 
 # Begins inside the wall.
 SHORT = {"duration": 0.3, "device.position": -0.0605}
@@ -90,6 +91,20 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
     assert live.summary["trajectory_sha256"] == run(written).summary["trajectory_sha256"]
     assert live.directory == tmp_path / "out"
     assert live["/plant"]["x"].dtype == np.float64
+
+
+@pytest.mark.slow
+def test_a_plugin_that_was_edited_is_loaded_anew_from_python(tmp_path: Path) -> None:
+    plugin, scene = tmp_path / "brake.py", tmp_path / "scene.toml"
+    plugin.write_text(source())
+    scene.write_text(
+        f'extends = "{SCENES / "fig6a.toml"}"\nduration = 0.4\n[[dissipation]]\nkind = "brake"\nacts = "always"\n'
+    )
+    with start(load(scene, plugins=[plugin]), paused=True) as loop:
+        plugin.write_text(source().replace("-self", "-2 * self"))
+        tick = loop.swap("brake", acts="always", damping=0.05, reload=True)
+        rows = loop.finish()["/controller"]
+    assert np.array_equal(rows["dissipation.0"][tick:], -0.1 * rows["v"][tick:])
 
 
 @pytest.mark.slow

@@ -153,6 +153,11 @@ def test_one_scene_or_an_unknown_method_draws_too(cost: Cost, tmp_path: Path) ->
     assert target.read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_figure_whose_name_has_no_suffix_is_a_png(figure: Any, tmp_path: Path) -> None:
+    assert write_figure(figure, tmp_path / "cost") == tmp_path / "cost.png"
+    assert (tmp_path / "cost.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_what_cannot_be_drawn_says_why(
     figure: Any, cost: Cost, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

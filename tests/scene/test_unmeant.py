@@ -30,6 +30,8 @@ CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
      {"hand": PUSHED, "wall": {"position": -0.06, "stiffness": 150}}, "The wall is at -60 m"),
     ({"hand": PUSHED | {"stiffness": 2000.0, "damping": 9.0}, "wall": WALL}, {"hand": PUSHED, "wall": WALL},
      "The wall is never reached"),
+    ({"hand": {"mass": 0.1, "force": {"kind": "constant", "value": 1.0}}, "wall": WALL},
+     {"hand": {"mass": 0.1, "force": {"kind": "constant", "value": -1.0}}, "wall": WALL}, "away from the wall"),
     ({"hand": PUSHED, "acceleration": {"source": "accelerometer"}},
      {"hand": PUSHED, "acceleration": {"source": "accelerometer"}, "accelerometer": {}}, "so it is ideal"),
     ({"hand": PUSHED, "wall": {"position": 0.01, "stiffness": 150}},

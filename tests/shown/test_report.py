@@ -39,7 +39,7 @@ def test_the_summary_table_holds_every_book_and_the_residual(swap: dict[str, Any
     assert row(text, "unidirectional-inertia (mass 0.01)") == ["1.5–3 s", *books]
     window = swap["window"]
     swing, ripple = (amount(window[key], "N") for key in ("force_swing_N", "force_ripple_N"))
-    assert row(text, "force, peak to peak") == [f"{swing} at its end; {ripple} of it above 30 Hz"]
+    assert row(text, "force, peak to peak") == [f"{swing} at its end; {ripple} of it from 30 Hz on"]
     assert row(text, "leak by delay") == [amount(energy["wall"]["leak"]["delay_J"], "J")]
     assert row(text, "work of the hand") == [amount(energy["hand_work_J"], "J")]
     assert row(text, "heat in the device") == [amount(energy["device_heat_J"], "J")]

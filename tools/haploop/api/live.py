@@ -154,15 +154,19 @@ class LiveLoop:
         """Changes numbers, ``{"wall.stiffness": "0.4 N/mm"}``, at once or at a simulated time; returns the tick."""
         return self._ask("set", set=plain(values), at=at)["tick"]
 
-    def swap(self, kind: str, *, element: int = 0, at: float | None = None, **parameters: Any) -> int:
+    def swap(
+        self, kind: str, *, element: int = 0, at: float | None = None, reload: bool = False, **parameters: Any
+    ) -> int:
         """Replaces an element, at once or at a simulated time, s; returns the tick.
 
         Args:
             kind: of the new element; "none" removes the one there is.
             element: counted from 0; one past the end adds one.
+            reload: whether to load the kind's plugin file anew first.
             parameters: of the new element.
         """
-        return self._ask("swap", swap={"kind": kind, **plain(parameters)}, element=element, at=at)["tick"]
+        table = {"kind": kind, **plain(parameters)}
+        return self._ask("swap", swap=table, element=element, at=at, reload=reload)["tick"]
 
     def undo(self) -> None:
         """Takes back the last swap or set."""

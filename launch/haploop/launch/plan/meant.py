@@ -92,6 +92,17 @@ def _out_of_reach(scene: Scene) -> Found | None:
     return {"way_mm": way_m * 1e3, "reach_mm": reach_m * 1e3} if way_m > reach_m and not is_told else None
 
 
+def _pushed_away(scene: Scene) -> Found | None:
+    """Tells whether a force that keeps its sign drives a device away from a wall that it does not touch."""
+    hand, wall = scene.hand, scene.wall
+    if wall is None or hand is None or hand.stiffness or scene.event or scene.others or _start_depth_m(scene) >= 0.0:
+        return None
+    inward = -1.0 if wall.occupies == "below" else 1.0
+    value_N = getattr(hand.force, "value", 0.0)
+    away = value_N * inward < 0.0 and scene.device.velocity * inward <= 0.0
+    return {"force_N": value_N} if away else None
+
+
 def _beyond_the_end(scene: Scene) -> Found | None:
     wall, most = scene.wall, scene.diverged_beyond
     if wall is None or _start_depth_m(scene) > 0.0 or abs(wall.position) < most or _wall_moves(scene):
@@ -140,6 +151,11 @@ RULES = (
         _out_of_reach,
         "The wall is never reached: it is {way_mm:.4g} mm away, and the hand's force and the speed at the start "
         "move the device by less than {reach_mm:.3g} mm.",
+    ),
+    Rule(
+        _pushed_away,
+        "The hand's force of {force_N:.3g} N drives the device away from the wall, which it does not touch; "
+        "hand.force.value or wall.occupies may be the other way round.",
     ),
     Rule(
         _ideal_accelerometer,

@@ -13,6 +13,11 @@ from haploop.tools.cli.options import FAILED, leave, plain_errors
 
 SCENE, FIGURE = "demo", "figure.png"
 
+_NEXT = (
+    'A word holds for this scene alone. Next: haploop advise {scene} --set "event=[]" tries other hands, delays and '
+    "devices (minutes); haploop new my.toml, haploop replay {directory}, haploop run {scene} --view."
+)
+
 
 def demo(
     out: Annotated[Path, typer.Option(help="directory in which a new one is made for the run and its figure")] = Path(
@@ -48,5 +53,5 @@ def demo(
             figure = draw(story, directory / FIGURE)
         except FigureError as error:
             leave(f"No figure: {error}\nThe run is in {directory}.", FAILED)
-    print(f"Next: haploop new my.toml, haploop replay {directory}, haploop run {SCENE} --view.", file=sys.stderr)
+    print(_NEXT.format(scene=SCENE, directory=directory), file=sys.stderr)
     print(figure)

@@ -43,6 +43,6 @@ def draw_own_columns(body: SubFigure, grid: GridSpec, row: int, run: RunData) ->
             index, own = _NAME.fullmatch(name).groups()  # pyright: ignore[reportOptionalMemberAccess]
             line(ax, run.ticks_s, column / factor, f"{own} of element {index}", style.element_colour(number), held=True)
         ax.set_xlim(*run.span_s)
-        style.dress(ax, "Shown by elements", "time (s)", f"({letter}{unit})" if unit else "")
+        style.dress(ax, "Elements' own columns", "time (s)", f"({letter}{unit})" if unit else "")
         style.legend(ax)
         mark_events([ax], run)

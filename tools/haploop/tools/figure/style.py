@@ -104,10 +104,12 @@ def empty_figure(width_in: float, height_in: float) -> Figure:
 
 
 def write_figure(figure: Figure, target: Path) -> Path:
-    """Writes a figure in the format of the file's suffix; returns the file.
+    """Writes a figure in the format of the file's suffix, ``.png`` where it has none; returns the file.
 
     Raises FigureError where it cannot be written; a figure that was there then stays.
     """
+    if not target.suffix and not target.is_dir():
+        target = target.with_name(f"{target.name}.png")
     picture, part = io.BytesIO(), target.with_name(f"{target.name}.part")
     try:
         figure.savefig(picture, dpi=_DPI, format=target.suffix.removeprefix(".") or None)

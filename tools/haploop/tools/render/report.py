@@ -92,7 +92,7 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     if (ripple_N := window.get("force_ripple_N")) is not None:
         whole = window.get("force_swing_N")
         both = f"{amount(whole, 'N')} at its end; " if whole is not None else ""
-        figures.append(("force, peak to peak", f"{both}{amount(ripple_N, 'N')} of it above 30 Hz"))
+        figures.append(("force, peak to peak", f"{both}{amount(ripple_N, 'N')} of it from 30 Hz on"))
     found = summary.get("stability", {})
     figures += _stability(found)
     if summary["verdict"] == "steady" and "push_N" in found:
@@ -183,7 +183,7 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     if not rests(found):
         watched = f"watched for {found['watched_s']:g} s"
         rows += [
-            ("its force above 30 Hz", f"{amount(found['force_ripple_N'], 'N')} peak to peak"),
+            ("its force from 30 Hz on", f"{amount(found['force_ripple_N'], 'N')} peak to peak"),
             ("growth", f"{found['rate_1_s']:.3g} +- {found['error_1_s']:.2g} 1/s, {watched}"),
         ]
     if (share := found.get("own_share")) is not None:
