@@ -60,6 +60,11 @@ def test_an_element_whose_force_at_rest_is_not_finite_is_refused_before_a_run_ta
         tried(source(at_force=f"return float('{force}')"))
 
 
+def test_an_element_that_gives_text_is_told_what_it_gave():
+    with pytest.raises(ElementError, match="it returned 'hello', which is text and no number"):
+        tried(source(at_force="return 'hello'"))
+
+
 @pytest.mark.parametrize("forged", ["{}", '{"kinds": 3}', '{"kinds": {"brake": []}}', "[" * 60_000])
 def test_an_answer_that_the_file_itself_has_given_is_told_as_such(forged):
     write = f"os.write(fd, {forged.encode()!r} + bytes([10]))"

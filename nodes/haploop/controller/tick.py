@@ -69,7 +69,8 @@ class NoForce(Exception):
         return f"Element {self.index} ({element.kind}) gave no force at tick {tick}: {what}.{hint}"
 
 
-def _number(force: Any) -> float:
+def as_number(force: Any) -> float:
+    """Returns an element's force as a number; TypeError where it is text, or nothing that float takes."""
     if isinstance(force, str | bytes):
         raise TypeError(f"it returned {force!r}, which is text and no number")
     return float(force)
@@ -122,7 +123,7 @@ def tick(params: ControllerParams, state: StateTuple, sample: Sample) -> tuple[S
                 if not contact and active.acts != "always":
                     force = 0.0
                 elif force.__class__ is not float:
-                    force = _number(force)
+                    force = as_number(force)
             else:
                 force = 1.0 * (force if active.acts == "always" else where(contact, force, 0.0))
             row.append(force)

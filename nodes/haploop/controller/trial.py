@@ -21,6 +21,7 @@ from typing import Any, TextIO
 from haploop.controller.active_elements import make_element
 from haploop.controller.dissipation.element import ASKABLE, Element, ElementError, Motion, place_in, raised
 from haploop.controller.dissipation.registry import PluginError, load_source
+from haploop.controller.tick import as_number
 from haploop.protocol.quantity import MEANT
 from haploop.protocol.scene.scene import ElementTable
 from haploop.protocol.transport.prints import keep_prints
@@ -107,7 +108,7 @@ def _make(elements: list[tuple[str, dict[str, float]]], kinds: dict[str, type[El
             motion.contact = contact
             try:
                 force, _ = (element.force(motion), None) if memory is None else element.force(motion, memory)
-                finite = math.isfinite(force)
+                finite = math.isfinite(as_number(force))
             except Exception as error:
                 what = raised(error, type(element))
                 raise ElementError(f"The element {kind} gave no force when it was tried at rest: {what}.") from error
