@@ -19,6 +19,7 @@ from helpers.runs.compiled import agree, compiled, jax, many
 from helpers.scenes.least import KINDS
 
 
+@pytest.mark.slow
 def test_results_are_those_of_arrays_but_for_the_last_digits() -> None:
     scenes = many(13)
     assert agree(compiled(scenes), run_batch(scenes, KINDS))
