@@ -13,7 +13,7 @@ import pytest
 from haploop.launch.processes import private_directory
 from haploop.logger import read
 from helpers.live.foreign import CONTROLLER, Started
-from helpers.live.launched import PATIENCE_S, Launched, alive, first_and_slowly, wait_for
+from helpers.live.launched import HAPLOOP, PATIENCE_S, Launched, alive, first_and_slowly, wait_for
 
 
 def seat_of(run: Launched, role: str = "controller") -> Path:
@@ -63,6 +63,34 @@ def test_of_two_programs_for_one_role_the_second_is_turned_away(started: Started
     assert not run.out_directory.exists()
     first.kill()
     first.wait()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("role", ["plant", "controller"])
+def test_a_half_that_has_joined_stays_until_the_logger_has_all_of_it(role: str, started: Started) -> None:
+    run = started("--external", role, node=None, sets=("event=[{at=2.99, pause=true}]",))
+    node = subprocess.Popen([*HAPLOOP, "join", str(seat_of(run, role))])
+    run.stands(run.reaches(2990))
+    run.send("logger", signal.SIGSTOP)
+    run.ask("resume")
+    wait_for("its last tick", lambda: 3000 in [n["tick"] for n in run.ask("status")["nodes"] if n["role"] == role])
+    with pytest.raises(subprocess.TimeoutExpired):
+        node.wait(1.0)
+    run.send("logger", signal.SIGCONT)
+    assert run.summary()["ticks"] == 3000
+    assert node.wait(PATIENCE_S) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("role", ["plant", "controller"])
+def test_a_half_that_has_joined_ends_by_itself_when_the_launcher_is_killed(role: str, started: Started) -> None:
+    run = started("--external", role, node=None, sets=("event=[{at=1.5, pause=true}]",))
+    node = subprocess.Popen([*HAPLOOP, "join", str(seat_of(run, role))], stderr=subprocess.PIPE, text=True)
+    run.stands(run.reaches(1500))
+    run.signal(signal.SIGKILL)
+    _, why = node.communicate(timeout=PATIENCE_S)
+    assert node.returncode == 1
+    assert "its launcher was ended" in why
 
 
 @pytest.mark.slow

@@ -42,6 +42,9 @@ class Refused(Exception):
 class ClockClient:
     """Speaks to the clock for one node.
 
+    Args:
+        is_watched: whether the fate of a local connection is watched, too, as that of one over a network always is.
+
     Attributes:
         until: ticks before this one may be worked on.
         last: whether no further ticks will be granted.
@@ -51,13 +54,20 @@ class ClockClient:
             this node.
     """
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], role: str, address: str, secret: str) -> None:
+    def __init__(
+        self,
+        context: zmq.Context[zmq.Socket[bytes]],
+        role: str,
+        address: str,
+        secret: str,
+        is_watched: bool = False,
+    ) -> None:
         self.role, self._secret = role, secret
         self.socket = open_socket(context, zmq.DEALER)
         self._address = address
         transport = transport_of(context)
         self._connection = None
-        if address.startswith("tcp:") and isinstance(context, SecureContext):
+        if (is_watched or address.startswith("tcp:")) and isinstance(context, SecureContext):
             self._connection = Connection(context, self.socket, address)
         # One of the run's own that is cut off is known no more; the last words of a run may still be on their way to
         # any other.
@@ -178,6 +188,17 @@ class ClockClient:
         """Sends DONE, FAILED or LEAVE, allows it 1 s to go out, and closes."""
         self._say(name, *fields)
         self.close(linger_ms=1000)
+
+    def leave_at_the_end(self, tick: int, result: Message) -> None:
+        """Sends DONE, and closes once the clock has: until then what was published here may still be on its way.
+
+        Raises Aborted where the run fails meanwhile.
+        """
+        self._say("DONE", tick, result)
+        while self._connection and not self._connection.is_down():
+            if self.socket.poll(_LOOK_MS):
+                self._receive()
+        self.close()
 
     def close(self, linger_ms: int = 0) -> None:
         """Closes the connection; what was sent last has some time to go out."""

@@ -96,16 +96,18 @@ def take_part(
     Args:
         start: address of the clock and secret of the run.
         tell: is told why it did not end with DONE.
-        life: by which the launcher, where there is one, keeps what is published here until it has been taken.
+        life: by which the launcher, where there is one, keeps what is published here until it has been taken; without
+            one the connection to the clock does, which lasts as long as the run.
     """
-    client = ClockClient(context, role, start["address"], start["secret"])
+    client = ClockClient(context, role, start["address"], start["secret"], is_watched=life is None)
     try:
         tick, result = work(client, context, directory)
         if life:
             life.loosen()
-        client.leave("DONE", tick, result)
-        if life:
+            client.leave("DONE", tick, result)
             life.wait()
+        else:
+            client.leave_at_the_end(tick, result)
         status = 0
     except Aborted as error:
         tell(str(error))
