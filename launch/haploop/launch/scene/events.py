@@ -39,6 +39,8 @@ def check_events(
         Index of each event that sets something -> settable key -> SI value. Mistakes are added to ``layers``.
     """
     events = [(i, e) for i, e in enumerate(_tables(layers.data.get("event"))) if isinstance(e, dict)]
+    if not events:
+        return {}
     slots = [e.get("kind") if isinstance(e, dict) else None for e in _tables(layers.data.get("dissipation"))]
     wall = _wall_of(layers)
     settings: dict[int, dict[str, float]] = {}

@@ -115,6 +115,7 @@ def _validated(hint: Any) -> Any:
     return hint
 
 
+@cache
 def number_of(table: type[Table], key: str) -> Number:
     declared = get_type_hints(table, include_extras=True).get(key)
     marks = get_args(_validated(declared)) if declared else model_of(table).model_fields[key].metadata
