@@ -114,6 +114,29 @@ def test_the_next_digit_costs_what_the_cheapest_setting_within_it_takes(cost: Co
     assert settings == ["rk4 at 1 kHz", "rk4 at 2 kHz", "same", either, "same", "1.3 µm"]
 
 
+def test_machine_code_has_a_row_and_a_half_sentence_of_its_own_and_leaves_the_others_as_they_were(cost: Cost) -> None:
+    def rk4_at_half_the_time(point: Point) -> Point:
+        return dataclasses.replace(point, time=times_of(point, 0.5)) if point.method == "rk4" else point
+
+    plain = changed(cost, rk4_at_half_the_time)
+    quick = [
+        dataclasses.replace(
+            scene, compiled=[dataclasses.replace(p, time=times_of(p, 0.1)) for p in scene.points if p.method == "exact"]
+        )
+        for scene in plain.scenes
+    ]
+    compiled = dataclasses.replace(plain, scenes=quick)
+    before, after = rows(plain, "next digit"), rows(compiled, "next digit")
+    assert {title: after[title] for title in before} == before
+    assert after["A wall that steadies, machine code"][-1] == "any error"
+    assert takes_away(compiled) == f"{takes_away(plain)} With friction as machine code one is in none of them."
+
+
+def times_of(point: Point, share: float) -> Spread:
+    assert point.time
+    return Spread(share * point.time.median, share * point.time.low, share * point.time.high)
+
+
 def test_where_the_reference_is_not_known_well_enough_no_setting_is_named(cost: Cost) -> None:
     swings = rows(cost, "next digit")["A wall in a limit cycle"]
     assert swings[3:5] == ["reference not known", "same"]

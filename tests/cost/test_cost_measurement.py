@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from haploop.launch.scene.file import load as load_scene
+from haploop.plant.friction import motion
 from haploop.tools.cost import grid as grid_module
 from haploop.tools.cost import measure, times
 from haploop.tools.cost.data import CostFileError, Spread, load, save
 from haploop.tools.cost.grid import grid
 from haploop.tools.cost.measure import Measurement
-from haploop.tools.cost.times import Store
+from haploop.tools.cost.times import Job, Store
 from helpers.data.costs import fake_cost
 from helpers.scenes.cost_scene import SMOOTH, count_stages, exact_reference
 
@@ -196,3 +197,17 @@ def test_an_interval_holds_the_median_of_endless_repeats_at_least_19_times_in_20
     spreads = [Spread.from_values(values) for values in rng.exponential(size=(2000, count)).tolist()]
     held = sum(spread.low <= math.log(2.0) <= spread.high for spread in spreads) / len(spreads)
     assert held > 0.94
+
+
+@pytest.mark.parametrize("is_compiled", [False, True])
+def test_a_run_is_timed_with_machine_code_from_its_start_or_without_any(is_compiled):
+    used = []
+    loops = motion.LOOPS
+    loops.asked = 7
+
+    def clock():
+        used.append(loops.asked + 1 >= loops.pays)
+
+    Job(times.IN_PROCESS, "", "", load_scene("all_effects.toml"), clock, is_compiled).timed()
+    assert used == [is_compiled]
+    assert loops.asked == 0

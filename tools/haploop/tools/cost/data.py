@@ -114,7 +114,11 @@ class ReferenceNote:
 
 @dataclass(frozen=True)
 class SceneCost:
-    """Every point of one scene, its own method and rates in Hz, the ticks of a run, and the advice."""
+    """Every point of one scene, its own method and rates in Hz, the ticks of a run, and the advice.
+
+    ``compiled`` are points of methods by loops of machine code, which give the same bits: a long run in one process
+    uses them, where they can be had; ``points`` are without.
+    """
 
     name: str
     title: str
@@ -125,6 +129,7 @@ class SceneCost:
     reference: ReferenceNote
     points: list[Point]
     advice: str = ""
+    compiled: list[Point] = field(default_factory=list)
 
     @property
     def own(self) -> Point | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.tools.cost.data import Cost, Errors, Point, SceneCost
-from haploop.tools.cost.findings import is_told_apart, takes_away
+from haploop.tools.cost.findings import COMPILED, is_told_apart, takes_away
 from haploop.tools.figure import style
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
@@ -32,6 +32,7 @@ LOOKS: dict[str, tuple[str, str]] = {
     "rk4": (style.ELEMENTS[1], "D"),
     "implicit-midpoint": (style.ELEMENTS[3], "^"),
     "dop853": (style.ELEMENTS[5], "P"),
+    COMPILED: (style.OF_THE_PLANT["friction"], "*"),
 }
 _OTHER = style.GREY, "X"
 # Below a reference's uncertainty there is nothing to see: what is smaller than this share of it is drawn there.
@@ -105,13 +106,13 @@ def draw_panel(ax: Axes, scene: SceneCost, tolerance_m: float) -> None:
     ax.axhspan(low, max(reference.error_m, low), color=UNCERTAIN, zorder=0, linewidth=0, gid="uncertainty")
     ax.axhline(tolerance_m, color=style.GREY, linewidth=0.9, dashes=(4, 3), zorder=1, gid="tolerance")
     for method in methods_of([scene]):
-        _curve(ax, [point for point in scene.points if point.method == method], scene)
+        _curve(ax, [point for point in drawn(scene) if point.method == method], scene)
     if any(point.time and not point.error for point in scene.points):
         ax.axhline(edge, color=style.FAINT, linewidth=0.8, zorder=1)
         ax.set_yticks([tick for tick in ax.get_yticks() if low <= tick < edge])
         place = {"ha": "right", "va": "center", "transform": ax.transAxes}
         ax.text(0.995, 1.0 - _TOP / 2.0, "failed", fontsize=style.SMALL, color=style.GREY, **place)
-    times = [end for p in scene.points if (t := p.time) for end in (t.low, t.median, t.high)]
+    times = [end for p in drawn(scene) if (t := p.time) for end in (t.low, t.median, t.high)]
     ax.set_xlim(min(times) / 1.25, max(times) * 1.25)
 
 
@@ -169,7 +170,7 @@ def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
 
 def label_points(ax: Axes, scene: SceneCost) -> None:
     """Writes the plant rate in kHz beside the points: of the scene's own method first, then where there is room."""
-    timed = [point for point in scene.points if point.time]
+    timed = [point for point in drawn(scene) if point.time]
     labels = []
     for point in sorted(timed, key=lambda point: (point.method != scene.own_method, not point.error)):
         in_kHz, colour = f"{point.plant_rate / 1000:g}", LOOKS.get(point.method, _OTHER)[0]
@@ -180,7 +181,12 @@ def label_points(ax: Axes, scene: SceneCost) -> None:
     place_labels(ax, labels, whole)
 
 
+def drawn(scene: SceneCost) -> list[Point]:
+    """Returns the points of a scene, and those of machine code."""
+    return [*scene.points, *scene.compiled]
+
+
 def methods_of(scenes: list[SceneCost]) -> list[str]:
     """Returns all methods, in the order of their looks, others after."""
-    found = dict.fromkeys(point.method for scene in scenes for point in scene.points)
+    found = dict.fromkeys(point.method for scene in scenes for point in drawn(scene))
     return [method for method in LOOKS if method in found] + [method for method in found if method not in LOOKS]

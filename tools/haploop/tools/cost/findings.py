@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from haploop.tools.cost.data import AlikeScene, Cost, Errors, Point, PriceGroup, SceneCost, Spread, Step
@@ -13,6 +13,8 @@ from haploop.tools.render.units import amount, fixed
 # The second run of the scene without effects: what it adds is chance.
 AGAIN = "no effect again"
 _NONE, EXACT, _RIVAL = "–", "exact", "euler"
+# The exact flow by loops of machine code.
+COMPILED = "exact, machine code"
 # An error that nobody asks after, of which the last digits may differ from machine to machine.
 _NOTHING_M = 1e-9
 # Errors that are asked for, m.
@@ -102,16 +104,30 @@ def findings(cost: Cost) -> list[FindingTable]:
 
 
 def _digit_table(cost: Cost) -> FindingTable:
-    """Makes a row a scene: the cheapest setting at every error asked for, and where the exact flow takes over."""
+    """Makes a row a scene: the cheapest setting at every error asked for, and where the exact flow takes over.
+
+    Another row of a scene that has times of the exact flow as machine code, with these in place of its others.
+    """
     rows = []
     for scene in cost.scenes:
         if any(point.time for point in scene.points):
-            below, cells = exact_below_m(scene), [_cell(scene, digit) for digit in DIGITS_M]
-            shown = ["same" if i and cell == cells[i - 1] else cell for i, cell in enumerate(cells)]
-            last = _NONE if below is None else "any error" if math.isinf(below) else amount(below, "m", 2)
-            rows.append([scene.short_title, *shown, last])
+            rows.append([scene.short_title, *_digits(scene)])
+        if any(point.time for point in scene.compiled):
+            rows.append([f"{scene.short_title}, machine code", *_digits(with_machine_code(scene))])
     heads = ("scene", *(amount(digit, "m", 2) for digit in DIGITS_M), "none cheaper than exact below")
     return FindingTable("digits", "What the next digit costs", heads, rows)
+
+
+def with_machine_code(scene: SceneCost) -> SceneCost:
+    """Returns a scene with the exact flow by loops of machine code, where there are times of that."""
+    exact = [replace(point, method=EXACT) for point in scene.compiled]
+    return replace(scene, points=exact + [p for p in scene.points if p.method != EXACT]) if exact else scene
+
+
+def _digits(scene: SceneCost) -> list[str]:
+    below, cells = exact_below_m(scene), [_cell(scene, digit) for digit in DIGITS_M]
+    shown = ["same" if i and cell == cells[i - 1] else cell for i, cell in enumerate(cells)]
+    return [*shown, _NONE if below is None else "any error" if math.isinf(below) else amount(below, "m", 2)]
 
 
 def _cell(scene: SceneCost, digit_m: float) -> str:
@@ -202,8 +218,20 @@ def is_told_apart(error: Errors) -> bool:
 
 
 def takes_away(cost: Cost) -> str:
-    """Makes the one sentence of the figure of methods: down to which error another method than the exact flow pays."""
-    known = [(scene, below) for scene in cost.scenes if (below := exact_below_m(scene)) is not None]
+    """Makes the one sentence of the figure of methods: down to which error another method than the exact flow pays.
+
+    With another, where it has times as machine code, of how many scenes that leaves.
+    """
+    without = _takes_away(cost.scenes)
+    if not any(point.time for scene in cost.scenes for point in scene.compiled):
+        return without
+    rows = [exact_below_m(with_machine_code(scene)) for scene in cost.scenes]
+    left = sum(below is not None and math.isfinite(below) for below in rows)
+    return f"{without} With friction as machine code one is in {left or 'none'} of them."
+
+
+def _takes_away(scenes: list[SceneCost]) -> str:
+    known = [(scene, below) for scene in scenes if (below := exact_below_m(scene)) is not None]
     pays = sorted(below for _, below in known if math.isfinite(below))
     always = len(known) - len(pays)
     if not pays:

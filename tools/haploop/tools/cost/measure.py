@@ -6,6 +6,7 @@ import random
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from functools import cached_property
+from importlib.util import find_spec
 from pathlib import Path
 
 from pydantic import TypeAdapter
@@ -16,7 +17,7 @@ from haploop.protocol.ticks import Timebase
 from haploop.tools.cost import times
 from haploop.tools.cost.alike import timed_alike
 from haploop.tools.cost.data import AlikeScene, Cost, Point, ReferenceNote, SceneCost, Spread, Step
-from haploop.tools.cost.findings import advice
+from haploop.tools.cost.findings import COMPILED, EXACT, advice
 from haploop.tools.cost.grid import Candidate, Grid, Outcome, errors_made_with, outcome, times_made_with, true_swings
 from haploop.tools.cost.prices import Prices
 from haploop.tools.cost.reference import Reference, reference_for
@@ -88,23 +89,31 @@ class Measurement:
         return Prices(self._store, self._repeats)
 
     def _jobs(self) -> list[Job]:
-        return [job for grid in self._grids for candidate in grid.candidates if (job := self._job(candidate))]
+        ways = [(c, is_compiled) for grid in self._grids for c in grid.candidates for is_compiled in self._ways(c)]
+        return [job for candidate, is_compiled in ways if (job := self._job(candidate, is_compiled))]
 
-    def _job(self, candidate: Candidate) -> Job | None:
+    @staticmethod
+    def _ways(candidate: Candidate) -> tuple[bool, ...]:
+        """Returns whether a candidate is timed as machine code: not, and where there is some for its motion, too."""
+        has_loops = candidate.method == EXACT and candidate.scene and candidate.scene.friction and find_spec("numba")
+        return (False, True) if has_loops else (False,)
+
+    def _job(self, candidate: Candidate, is_compiled: bool) -> Job | None:
         """Makes a job of a candidate whose run had a tick.
 
         A run that diverges has but a few ticks: it is let go on far beyond where it is stopped otherwise, in blocks so
         short that there is more than the first one where it can be.
         """
         came, scene = self._outcome(candidate), candidate.scene
-        key = self._time_key(candidate)
+        key = _compiled(self._time_key(candidate), is_compiled)
         if scene is None or came is None or not (ticks := came.ticks):
             return None
         measured = scene
         if came.error is None:
             short = replace(scene.run, block_ticks=max(_LEAST_BLOCK, ticks // 2))
             measured = replace(scene, diverged_beyond=_FAR_M, run=short)
-        return Job(IN_PROCESS, (candidate.path, candidate.method), key, measured, lambda: times.loop_us(measured))
+        family = candidate.path, candidate.method, is_compiled
+        return Job(IN_PROCESS, family, key, measured, lambda: times.loop_us(measured), is_compiled)
 
     def _outcome(self, candidate: Candidate) -> Outcome | None:
         record = self._store.get(_OUTCOME, self._error_key(candidate))
@@ -134,18 +143,27 @@ class Measurement:
         """Returns what is known of a scene, with advice once that is all; None before its reference is there."""
         if (note := self._store.get(_REFERENCE, self._error_key(grid))) is None:
             return None
-        points = [point for candidate in grid.candidates if (point := self._point(candidate))]
+        points = [point for candidate in grid.candidates if (point := self._point(candidate, False))]
+        ways = [candidate for candidate in grid.candidates if True in self._ways(candidate)]
+        compiled = [point for candidate in ways if (point := self._point(candidate, True))]
         scene, ticks = grid.scene, Timebase.from_scene(grid.scene).ticks
         about = *grid.own, scene.clock.control_rate, ticks, ReferenceNote(**note)
-        made = SceneCost(grid.path.stem, scene.title, *about, points)
+        made = SceneCost(grid.path.stem, scene.title, *about, points, compiled=compiled)
         untimed = times.missing(self._store, self._jobs(), self._repeats[IN_PROCESS])
         complete = len(points) == len(grid.candidates) and not untimed
         return replace(made, advice=advice(made, tolerance_m)) if complete else made
 
-    def _point(self, candidate: Candidate) -> Point | None:
+    def _point(self, candidate: Candidate, is_compiled: bool) -> Point | None:
         if (came := self._outcome(candidate)) is None:
             return None
-        values = self._store.all(IN_PROCESS, self._time_key(candidate), self._repeats[IN_PROCESS])
+        key = _compiled(self._time_key(candidate), is_compiled)
+        values = self._store.all(IN_PROCESS, key, self._repeats[IN_PROCESS])
         known = [value for value in values if value is not None]
         time = Spread.from_values(known) if known else None
-        return Point(candidate.method, candidate.plant_rate, came.error, came.failure, time)
+        method = COMPILED if is_compiled else candidate.method
+        return Point(method, candidate.plant_rate, came.error, came.failure, time)
+
+
+def _compiled(key: str, is_compiled: bool) -> str:
+    """Returns the name in the store of a time, of machine code or not."""
+    return f"{key} compiled" if is_compiled else key

@@ -31,7 +31,9 @@ from haploop.launch.scene.bundled import bundled_folder
 from haploop.launch.scene.events import scene_events
 from haploop.launch.scene.file import load
 from haploop.launch.spec import RunFailed
+from haploop.logger.books import segments
 from haploop.logger.session import open_session
+from haploop.plant.friction import motion, projected
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cost.data import Load
@@ -89,7 +91,8 @@ class Job:
     """A resolved scene and a way to time its run, ``IN_PROCESS`` or ``PROCESSES``.
 
     Of the jobs of one ``family`` one, run untimed beforehand, warms up all. ``key`` is its name in the store. ``clock``
-    runs it once and returns the time of a tick, µs; None where the run failed.
+    runs it once and returns the time of a tick, µs; None where the run failed. ``is_compiled``: by loops of machine
+    code, as they serve a long run in one process; a short one, and a node, go without.
     """
 
     way: str
@@ -97,6 +100,21 @@ class Job:
     key: str
     scene: Scene
     clock: Callable[[], float | None]
+    is_compiled: bool = False
+
+    def timed(self) -> float | None:
+        """Returns the time of a tick, µs; None where the run failed."""
+        _have_machine_code(self.is_compiled)
+        try:
+            return self.clock()
+        finally:
+            _have_machine_code(False)
+
+
+def _have_machine_code(is_compiled: bool) -> None:
+    """Has the next run in this process use loops of machine code from its start, or none of them."""
+    for loops in (motion.LOOPS, projected.LOOPS, segments.LOOPS):
+        loops.asked = int(loops.pays) if is_compiled else 0
 
 
 def loop_us(scene: Scene) -> float | None:
@@ -175,7 +193,7 @@ def measure(store: Store, jobs: Sequence[Job], repeats: int, name: str, stage: S
             before = loop_us(plain)
             for job in random.Random(_SEED + repeat).sample(jobs, len(jobs)):
                 if not store.has(way, job.key, repeat):
-                    took, after = job.clock(), loop_us(plain)
+                    took, after = job.timed(), loop_us(plain)
                     assert before
                     assert after
                     mean = (before + after) / 2.0
@@ -209,7 +227,7 @@ def _still() -> Iterator[None]:
 def _warm(store: Store, jobs: Sequence[Job], repeats: int) -> None:
     """Runs the first of every family once untimed: imports, first calls, the interpreter's adaptive code."""
     for job in {job.family: job for job in reversed(jobs) if missing(store, [job], repeats)}.values():
-        job.clock()
+        job.timed()
 
 
 def quiet(store: Store, jobs: Sequence[Job], repeats: int) -> Load | None:
