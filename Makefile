@@ -62,8 +62,9 @@ bench: $(READY) ## measure speed, memory, what each effect and the live page cos
 
 accuracy: $(READY) ## measure what accuracy costs and write docs/accuracy.md (four minutes on two idle cores; stopped, it goes on where it was)
 	@$(BIN)/haploop cost --out runs/accuracy
+	@cp docs/accuracy.md runs/accuracy/page_before.md
 	@$(BIN)/python -m haploop.tools.cost.page runs/accuracy docs
-	@$(BIN)/python tests/bench/plants.py docs/accuracy.md
+	@$(BIN)/python tests/bench/plants.py docs/accuracy.md runs/accuracy/page_before.md
 
 paper: $(READY) ## make every figure of the paper, write docs/paper.md and paper_claims.md (some 20 minutes on two cores; stopped, it goes on)
 	@$(BIN)/haploop paper --out runs/paper

@@ -105,10 +105,10 @@ def _cells(line: str) -> list[str]:
 
 
 def main() -> None:
-    page = Path(sys.argv[1])
+    page, before = map(Path, sys.argv[1:])
     text = page.read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as directory:
-        made = section(Path(directory), text)
+        made = section(Path(directory), before.read_text(encoding="utf-8"))
     sections = [one for one in text.split("\n## ") if not one.startswith(TITLE)]
     sections.insert(-1, made)  # the last one tells the machine
     page.write_text("\n## ".join(sections), encoding="utf-8")
