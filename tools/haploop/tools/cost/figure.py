@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _PANEL_IN = 5.0, 4.4
 _MARKED_HZ = 10_000
 UNCERTAIN = "#E4E4E4"
-_TITLE_LETTERS = 58
+_TITLE_LETTERS, _LETTERS_PER_IN = 58, 10.5
 # Colours that the colour-blind tell apart, and a marker each, for those who see none; others begin anew.
 LOOKS: dict[str, tuple[str, str]] = {
     "exact": (style.WALL, "o"),
@@ -58,7 +58,8 @@ def figure_of(cost: Cost) -> Figure:
     _how_to_read(panels[len(scenes)], cost, scenes)
     for ax in panels[len(scenes) + 1 :]:
         ax.set_axis_off()
-    figure.suptitle(takes_away(cost), x=0.01, ha="left", fontsize=style.TEXT + 2, color=style.INK, gid="takes away")
+    headline = "\n".join(wrap(takes_away(cost), int(_LETTERS_PER_IN * columns * _PANEL_IN[0])))
+    figure.suptitle(headline, x=0.01, ha="left", fontsize=style.TEXT + 2, color=style.INK, gid="takes away")
     style.fix_layout(figure)
     for ax, scene in zip(panels, scenes, strict=False):
         label_points(ax, scene)
