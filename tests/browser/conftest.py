@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from helpers.live.browser import ARGUMENTS, DESK, NAMES, is_complaint
+from helpers.live.browser import BROWSERS, DESK, is_complaint
 from helpers.live.launched import PATIENCE_S
 
 if TYPE_CHECKING:
@@ -19,16 +19,17 @@ if TYPE_CHECKING:
 PATIENCE_MS = 1000 * PATIENCE_S
 
 
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    """One browser for all tests."""
+@pytest.fixture(scope="session", params=["chromium"])
+def browser(request: pytest.FixtureRequest) -> Iterator[Browser]:
+    """One browser for all tests: Chromium, and for those marked ``IN_BOTH`` Firefox, too."""
     playwright = pytest.importorskip("playwright.sync_api", reason="there is no playwright to drive a browser with")
-    found = next(filter(None, map(shutil.which, NAMES)), None)
+    names, options = BROWSERS[request.param]
+    found = next(filter(None, map(shutil.which, names)), None)
     if not found:
-        pytest.skip(f"there is no browser: none of {', '.join(NAMES)} is on the path")
+        pytest.skip(f"there is no browser: none of {', '.join(names)} is on the path")
     with playwright.sync_playwright() as driver:
         playwright.expect.set_options(timeout=PATIENCE_MS)
-        browser = driver.chromium.launch(executable_path=found, args=ARGUMENTS, timeout=PATIENCE_MS)
+        browser = getattr(driver, request.param).launch(executable_path=found, timeout=PATIENCE_MS, **options)
         yield browser
         browser.close()
 
@@ -36,7 +37,7 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture
 def open_page(browser: Browser) -> Iterator[Callable[..., Page]]:
     """Open a link as a user does; at the end no page may have complained or asked anybody but its own server."""
-    contexts, complaints, strangers = [], [], []
+    contexts, told, strangers = [], [], []
 
     def open_page(url: str, **options: Any) -> Page:
         given: dict[str, Any] = {"viewport": DESK} | options
@@ -48,8 +49,8 @@ def open_page(browser: Browser) -> Iterator[Callable[..., Page]]:
         own = (origin, origin.replace("http://", "ws://"), "data:", "blob:")
         page.on("request", lambda request: None if request.url.startswith(own) else strangers.append(request.url))
         page.on("websocket", lambda socket: None if socket.url.startswith(own) else strangers.append(socket.url))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("console", lambda said: complaints.append(said.text) if is_complaint(said) else None)
+        page.on("pageerror", lambda error: told.append(str(error)))
+        page.on("console", lambda said: told.append(said.text) if said.type in ("error", "warning") else None)
         page.goto(url)
         return page
 
@@ -57,7 +58,7 @@ def open_page(browser: Browser) -> Iterator[Callable[..., Page]]:
     for context in contexts:
         context.close()
     assert strangers == []
-    assert complaints == []
+    assert list(filter(is_complaint, told)) == []
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from helpers.live.browser import seen, settled
+from helpers.live.browser import DESK, IN_BOTH, PHONE, seen, settled, still
 from oracles.snapshots import contact, snapshot, table
 
 NAN = math.nan
@@ -28,6 +28,7 @@ def positions(x, wall=None):
     return snapshot(0.0, 2.0, table("position", 0.0, 2.0 / (len(x) - 1), *columns))
 
 
+@IN_BOTH
 def test_a_line_goes_through_its_values_and_is_broken_where_there_are_none(stand_in, page):
     ramp = [0.01 * i / (ROWS - 1) for i in range(ROWS)]
     hole = [NAN if 0.4 < i / ROWS < 0.6 else value for i, value in enumerate(ramp)]
@@ -104,6 +105,7 @@ def test_the_numbers_of_an_axis_leave_its_label_alone_however_large_they_are(sta
     assert label(-8e6, "−8.000") != alone
 
 
+@IN_BOTH
 def test_every_part_has_its_line_its_name_and_its_number(stand_in, page):
     stand_in.show(contact())
     settled(page, "force", "0: damping")
@@ -119,6 +121,79 @@ def test_every_part_has_its_line_its_name_and_its_number(stand_in, page):
     assert len(set(looks)) == 4
     dashes = [look.rsplit(")", 1)[1] for look in looks]
     assert len(set(dashes[1:3])) == 2, "elements differ without colour, too"
+
+
+@IN_BOTH
+@pytest.mark.slow
+def test_a_chart_stays_in_its_place_under_the_cursor_whatever_its_numbers_need(stand_in, page):
+    """At each of these widths the time under the cursor may need a row more in some legend."""
+    stand_in.show(contact())
+    settled(page, "force", "0: damping")
+    for width in (1130, 1210, 1290):
+        page.set_viewport_size({"width": width, "height": 720})
+        still(page)
+        box = page.locator("#force .u-over").bounding_box()
+        places = []
+        for part in (0.3, 0.4, 0.5):
+            page.mouse.move(box["x"] + box["width"] * part, box["y"] + 30)
+            settled(page, "force", "wall")
+            still(page)
+            places.append(page.locator("#force .u-over").bounding_box()["y"])
+            assert "at " in page.inner_text("#force .note"), width
+        assert len(set(places)) == 1, width
+        page.mouse.move(0, 0)
+        expect(page.locator("#force .note")).to_be_empty()
+        assert page.locator("#force .u-over").bounding_box()["y"] == places[0], width
+
+
+@IN_BOTH
+@pytest.mark.slow
+def test_of_many_books_the_legend_leaves_the_chart_its_room_and_every_name_can_be_scrolled_to(stand_in, page):
+    books = [(f"unidirectional-inertia-{i}", "J", f"unidirectional-inertia-{i}", [1e-3 * i] * ROWS) for i in range(16)]
+    stand_in.show(snapshot(0.0, 2.0, table("energy", 0.0, 2.0 / (ROWS - 1), *books)))
+    names = page.locator("#energy .legend .name")
+    expect(names).to_have_count(16)
+    assert page.locator("#energy .u-over").bounding_box()["height"] > 60
+    names.last.scroll_into_view_if_needed()
+    legend, name = page.locator("#energy .legend").bounding_box(), names.last.bounding_box()
+    assert legend["y"] <= name["y"]
+    assert name["y"] + name["height"] <= legend["y"] + legend["height"] + 1
+
+
+@IN_BOTH
+@pytest.mark.slow
+def test_a_label_stands_over_the_lines_of_other_changes(stand_in, page):
+    stand_in.tell({"type": "events", "events": [
+        {"tick": tick, "t_s": tick / 1000, "text": "set", "kind": "set"} for tick in (500, *range(510, 660, 16))
+    ]})  # fmt: skip
+    stand_in.show(contact())
+    settled(page, "force", "total")
+    solid = """() => {
+        const canvas = document.querySelector("#energy canvas"), over = document.querySelector("#energy .u-over");
+        const ratio = canvas.width / canvas.clientWidth, draw = canvas.getContext("2d");
+        const x = Math.round((over.offsetLeft + 0.275 * over.offsetWidth) * ratio);
+        const column = y => draw.getImageData(x - 12, (over.offsetTop + y) * ratio, 24, 1).data;
+        const lines = y => [...column(y)].filter((_, i) => i % 4 === 3).filter(alpha => alpha > 200).length;
+        return [lines(1), lines(over.offsetHeight / 2)];
+    }"""
+    label, below = page.evaluate(solid)
+    assert label > 2 * below, "the ground of the label hides the lines, which stand below it"
+
+
+@IN_BOTH
+@pytest.mark.slow
+@pytest.mark.parametrize("viewport", [DESK, PHONE])
+def test_own_columns_with_long_names_are_told_in_full(viewport, stand_in, page):
+    page.set_viewport_size(viewport)
+    label = "element 0: time-domain-passivity-observer, velocity_after_deadband_and_filter"
+    stand_in.state(own=True)
+    page.click("[data-panel=own]")
+    columns = [(f"own.0.{i}", "m/s", label, [0.1 * i] * ROWS) for i in range(2)]
+    stand_in.show(snapshot(0.0, 2.0, table("own.0", 0.0, 2.0 / (ROWS - 1), *columns)))
+    name = page.locator("#own .legend .name").first
+    expect(name).to_have_text(label.removeprefix("element "))
+    assert name.evaluate("e => e.scrollWidth <= e.clientWidth + 1 && e.scrollHeight <= e.clientHeight + 1")
+    assert page.locator("#own .u-over").bounding_box()["height"] > 80
 
 
 @pytest.mark.slow

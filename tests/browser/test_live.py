@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from helpers.live.browser import free_port
+from helpers.live.browser import IN_BOTH, free_port
 from helpers.live.launched import Launched, Run, wait_for
 
 pytest.importorskip("aiohttp", reason="the live page needs aiohttp: pip install 'haploop[view]'")
@@ -52,6 +52,7 @@ def events(run: Run) -> list[dict]:
     return [{k: v for k, v in e.items() if k not in ("at", "timestamp")} for e in run.log()["/events"]]
 
 
+@IN_BOTH
 @pytest.mark.slow
 def test_a_swap_in_mid_contact_takes_effect_at_its_tick_is_marked_and_stands_in_the_log(running, viewing):
     run = running(sets=STANDS_AT_1000)
@@ -97,6 +98,7 @@ def test_a_refused_value_is_told_with_the_reason_and_nothing_has_changed(running
     assert [event for event in events(run) if "swap" in event or "set" in event] == []
 
 
+@IN_BOTH
 @pytest.mark.slow
 def test_pause_steps_set_and_pace_reach_the_run(running, viewing):
     run = running(sets=AT_THE_WALL, pace=("--pace", "1"))
@@ -171,6 +173,7 @@ def test_what_the_page_draws_are_the_numbers_of_the_log(running, viewing):
     assert np.array_equal(total[::rows], controller["total"][900:1000].astype(np.float32))
 
 
+@IN_BOTH
 @pytest.mark.slow
 def test_after_the_end_the_page_shows_what_came_of_the_run_and_then_the_next_run(running, viewing):
     first = running(sets=("duration=1", "event=[{at=0.5, pause=true}]"))
@@ -188,6 +191,7 @@ def test_after_the_end_the_page_shows_what_came_of_the_run_and_then_the_next_run
     expect(page.locator("#pause")).to_be_enabled()
 
 
+@IN_BOTH
 @pytest.mark.slow
 def test_a_viewer_started_anew_on_its_port_is_found_again_but_its_old_link_steers_no_more(running, viewing, launched):
     run, port = running(sets=STANDS_AT_1000), str(free_port())

@@ -6,7 +6,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from helpers.live.browser import order
+from helpers.live.browser import IN_BOTH, order
 from helpers.live.stand_in import OPTIONS, RUNNING, RUNS
 from oracles.snapshots import contact, snapshot, table
 
@@ -39,6 +39,7 @@ def test_bars_of_energy_lie_left_of_zero_where_they_feed_and_right_where_they_ta
     expect(page.locator("#budget output").first).to_have_text("−250 µW")
 
 
+@IN_BOTH
 def test_two_clicks_measure_time_frequency_and_differences_and_a_third_ends_it(stand_in, page):
     ramp = [0.01 * i / 400 for i in range(401)]
     stand_in.show(snapshot(0.0, 2.0, table("position", 0.0, 0.005, ("x", "m", "position", ramp))))
@@ -86,6 +87,7 @@ def test_another_live_run_is_told_and_any_run_can_be_opened_or_drawn_over(stand_
     assert over == ("overlay", {"run": "wall-1"})
 
 
+@IN_BOTH
 def test_dragging_the_strip_shows_another_part_of_the_run_and_its_end_is_live(stand_in, page):
     stand_in.state(tick=10_000, end_tick=20_000)
     stand_in.show(contact(8.0, 10.0))

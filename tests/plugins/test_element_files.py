@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from haploop.controller.controller import Controller
-from haploop.controller.dissipation import ElementError
+from haploop.controller.dissipation import Element, ElementError
 from haploop.controller.dissipation.element import raised
 from haploop.controller.dissipation.registry import load_source
 from haploop.launch.runs.start import prepare, run
@@ -74,3 +74,8 @@ def test_what_an_element_prints_is_not_heard_again_where_its_run_is_judged_or_re
     )
     Work(lambda _: of, sources=(("loud.py", text),)).run([0])
     assert "heard" not in said.out + said.err + capfd.readouterr().err
+
+
+def test_an_element_without_a_docstring_is_not_described_by_its_signature():
+    silent = type("Silent", (Element,), {"kind": "silent", "force": lambda self, motion: 0.0})
+    assert silent.__doc__ is None

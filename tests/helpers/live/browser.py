@@ -8,19 +8,33 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+import pytest
+
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
     from helpers.live.stand_in import StandIn
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-# Nothing is fetched, synchronised or reported: what the page asks for is all that is asked for.
-ARGUMENTS = [
-    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync",
-]  # fmt: skip
+# Names on the path and options of each. Chromium: nothing is fetched, synchronised or reported, so what the page asks
+# for is all that is asked for. Firefox: the one that is installed, driven by WebDriver BiDi.
+BROWSERS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
+    "chromium": (
+        ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"),
+        {"args": [
+            "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+            "--disable-component-update", "--disable-sync",
+        ]},
+    ),
+    "firefox": (("firefox", "firefox-esr"), {"channel": "moz-firefox"}),
+}  # fmt: skip
+IN_BOTH = pytest.mark.parametrize(
+    "browser", ["chromium", pytest.param("firefox", marks=pytest.mark.slow)], indirect=True
+)
 # What a browser says because of what a test does: it stops a server, and reads the pixels of a chart.
-OF_THE_TEST = ("ERR_CONNECTION_", "ERR_EMPTY_RESPONSE", "before receiving a handshake response", "willReadFrequently")
+OF_THE_TEST = (
+    "ERR_CONNECTION_", "ERR_EMPTY_RESPONSE", "before receiving a handshake response", "willReadFrequently",
+    "establish a connection to the server at ws:", "was interrupted while the page was loading",
+)  # fmt: skip
 DESK = {"width": 1280, "height": 720}
 PHONE = {"width": 390, "height": 844}
 
@@ -76,9 +90,9 @@ def still(page: Page) -> None:
     page.evaluate(STILL)
 
 
-def is_complaint(said: Any) -> bool:
-    """Tells whether a message on the console is a complaint of the page."""
-    return said.type in ("error", "warning") and not any(word in said.text for word in OF_THE_TEST)
+def is_complaint(text: str) -> bool:
+    """Tells whether an error or a warning is a complaint of the page."""
+    return not any(words in text for words in OF_THE_TEST)
 
 
 def order(stand_in: StandIn, page: Page, act: Callable[[], object]) -> tuple[str, dict[str, Any]]:

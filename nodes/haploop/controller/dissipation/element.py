@@ -181,7 +181,9 @@ class Element(ABC):
         super().__init_subclass__(**kwargs)
         # A list or a dict would count as something that the class keeps.
         cls.asks, cls.columns = tuple(cls.asks), MappingProxyType(dict(cls.columns))
+        about = cls.__doc__
         dataclasses.dataclass(kw_only=True, eq=False)(cls)
+        cls.__doc__ = about  # a dataclass without one would tell its signature
 
     @abstractmethod
     def force(self, *args: Any, **kwargs: Any) -> Any:

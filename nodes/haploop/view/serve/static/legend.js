@@ -20,13 +20,24 @@ function swatch({ colour: name, width, dash = [] }) {
   return svg;
 }
 
+/** Keeps the rows that numbers once needed: a row that came and went would move the chart from under the cursor. */
+function keepRows(head) {
+  let width = 0;
+  new ResizeObserver(() => {
+    if (head.clientWidth !== width) head.style.minHeight = "";
+    width = head.clientWidth;
+    head.style.minHeight = `${head.offsetHeight}px`;
+  }).observe(head);
+}
+
 export class Legend {
   /** @param {(key: string) => void} toggled called when a line was hidden or brought back. */
   constructor(host, toggled) {
     this.list = make("ul", { class: "legend" });
     this.note = make("p", { class: "note" });
-    const head = make("div", { class: "head" }, this.list, this.note);
-    host.prepend(head);
+    this.head = make("div", { class: "head" }, this.list, this.note);
+    host.prepend(this.head);
+    keepRows(this.head);
     this.toggled = toggled;
     this.hidden = new Set();
     this.values = [];
@@ -35,6 +46,7 @@ export class Legend {
   /** Name these lines: [{key, label, line}]. What was hidden stays hidden. */
   name(entries) {
     this.values = entries.map(() => make("output"));
+    this.head.style.minHeight = "";
     this.list.replaceChildren(...entries.map((entry, i) => this.entry(entry, this.values[i])));
   }
 

@@ -21,7 +21,7 @@ export function marksOf(events) {
   return [...marks.values()].sort((a, b) => a.tick - b.tick);
 }
 
-/** Draw the marks that lie in the chart; a label that has no room is left out, its line never is. */
+/** Draw the marks that lie in the chart, labels over all lines; a label that has no room is left out, its line never is. */
 export function drawMarks(u, marks) {
   const { left, top, width, height } = u.bbox;
   const { min, max } = u.scales.x;
@@ -36,21 +36,24 @@ export function drawMarks(u, marks) {
   ctx.textBaseline = "top";
   ctx.textAlign = "left";
   ctx.lineWidth = ratio;
-  for (const mark of marks.filter(({ t_s }) => t_s >= min && t_s <= max)) {
-    const x = Math.round(left + ((mark.t_s - min) / (max - min)) * width) + 0.5;
-    ctx.strokeStyle = colour(mark.changes ? "mark" : "grey");
+  const shown = marks.filter(({ t_s }) => t_s >= min && t_s <= max);
+  const place = ({ t_s }) => Math.round(left + ((t_s - min) / (max - min)) * width) + 0.5;
+  const tone = (mark) => colour(mark.changes ? "mark" : "grey");
+  for (const mark of shown) {
+    const x = place(mark);
+    ctx.strokeStyle = tone(mark);
     ctx.setLineDash(mark.changes ? [] : [2 * ratio, 3 * ratio]);
     ctx.beginPath();
     ctx.moveTo(x, top);
     ctx.lineTo(x, top + height);
     ctx.stroke();
-    drawLabel(ctx, `${mark.tick} ${mark.words.join(", ")}`, x, u.bbox, free, ratio);
   }
+  for (const mark of shown) drawLabel(ctx, `${mark.tick} ${mark.words.join(", ")}`, tone(mark), place(mark), u.bbox, free, ratio);
   ctx.restore();
 }
 
 /** Write a label beside its line, in the first lane that is free there. */
-function drawLabel(ctx, text, x, { left, top, width }, free, ratio) {
+function drawLabel(ctx, text, tone, x, { left, top, width }, free, ratio) {
   const wide = ctx.measureText(text).width + 2 * GAP_PX * ratio;
   const start = x + wide > left + width ? x - wide : x;
   const lane = free.findIndex((end) => end <= start);
@@ -59,7 +62,7 @@ function drawLabel(ctx, text, x, { left, top, width }, free, ratio) {
   const y = top + lane * (TEXT_PX + GAP_PX) * ratio;
   ctx.fillStyle = colour("veil");
   ctx.fillRect(start + ratio, y, wide - 2 * ratio, (TEXT_PX + 3) * ratio);
-  ctx.fillStyle = ctx.strokeStyle;
+  ctx.fillStyle = tone;
   ctx.fillText(text, start + GAP_PX * ratio, y + 2 * ratio);
 }
 
