@@ -20,7 +20,7 @@ from haploop.launch.batch.run import run_batch
 from haploop.logger.books import work
 from haploop.logger.books.work import BatchSums
 from haploop.plant.where_it_pays import WhereItPays
-from haploop.protocol.machine_code import MachineCode
+from haploop.protocol.machine_code import MADE, MachineCode
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.sweep.sweep_file import load
 from helpers.runs.batches import alone, diverging, pressed, together
@@ -166,6 +166,50 @@ def test_loops_are_loaded_once_enough_was_asked_of_a_process_and_no_sooner(
     assert found[2].tried == [1]
 
 
-def test_a_process_that_others_wait_for_loads_no_loops(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_others_wait_for_loads_only_loops_that_were_made_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = "made = False\ndef is_made(): return made\ndef try_out(): assert made\n"
+    (tmp_path / "loops_that_wait.py").write_text(module, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(WhereItPays, "may_wait", False)
-    assert WhereItPays("loops_that_would_be_missed", 0).module_for(10**9) is None
+    loops = WhereItPays("loops_that_wait", 10)
+    assert loops.module_for(20) is None
+    assert "loops_that_wait" not in sys.modules  # its import would take a second for nothing
+    of_others = tmp_path / "__pycache__/loops_that_wait-0" / f"{MADE}for another processor"
+    of_others.parent.mkdir(parents=True)
+    of_others.touch()
+    assert loops.module_for(0) is None
+    vars(sys.modules["loops_that_wait"])["made"] = True
+    assert loops.module_for(0) is sys.modules["loops_that_wait"]
+
+
+@pytest.mark.slow
+def test_machine_code_is_made_once_it_was_tried_out_and_for_this_processor_alone(by_loops: None) -> None:
+    from haploop.launch.batch import loops
+
+    assert loops.is_made()
+    asks = "from haploop.launch.batch import loops; print(loops.is_made())"
+    environment = {**os.environ, "NUMBA_CPU_NAME": "core2"}
+    said = subprocess.run([sys.executable, "-c", asks], env=environment, capture_output=True, text=True, check=True)
+    assert said.stdout == "False\n"
+
+
+@pytest.mark.slow
+def test_the_nodes_of_a_long_run_load_the_loops_that_were_made_and_keep_its_bits(tmp_path: Path) -> None:
+    """A run of 20 s with friction, in one process, where they are made if need be, and as processes."""
+    pytest.importorskip("numba")
+    sets = ["--set", "duration=20", "--set", "run.log=none", "--set", "run.verdict=window", "--json"]
+    words = [str(Path(sys.executable).with_name("haploop")), "run", "all_effects", *sets]
+    loads = {**os.environ, "PYTHONVERBOSE": "1"}
+    hashes, said = [], ""
+    for name, option, environment in (("one", ["--in-process"], None), ("three", [], loads)):
+        out = tmp_path / name
+        ran = subprocess.run(
+            [*words, *option, "--out", str(out)], env=environment, capture_output=True, text=True, check=True
+        )
+        hashes.append(json.loads(ran.stdout)["trajectory_sha256"])
+        said = ran.stderr + "".join(path.read_text() for path in out.glob("prints*"))
+    assert hashes[0] == hashes[1]
+    assert "import 'haploop.plant.friction.course'" in said
+    assert "import 'haploop.logger.books.loops'" in said

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, ClassVar
+
+from haploop.protocol.machine_code import MADE
 
 
 class WhereItPays:
     """A module of loops of machine code, loaded once so much was to be done in this process: sooner it costs more.
 
-    The module has ``try_out()``, which raises where the loops cannot be compiled, or loaded.
+    The module has ``try_out()``, which raises where the loops cannot be compiled, or loaded, and ``is_made()``, which
+    tells whether they were compiled before.
 
     Attributes:
         may_wait: whether this process may wait until they are compiled, 16 s, or a minute on a busy machine: not the
-            nodes of a run, which have deadlines; runs in one process and batches set it.
+            nodes of a run, which have deadlines and load what is made already; runs in one process and batches set it.
         pays: from how much on it pays.
         asked: how much was to be done so far.
     """
@@ -27,7 +32,7 @@ class WhereItPays:
     def module_for(self, amount: int) -> Any:
         """Returns the module where it pays with so much more to do, and may be waited for, and works; else None."""
         self.asked += amount
-        return self.module() if self.may_wait and self.asked >= self.pays else None
+        return self.module() if self.asked >= self.pays and (self.may_wait or self._is_made()) else None
 
     def module(self) -> Any:
         """Returns the module, or None where it does not work."""
@@ -39,6 +44,17 @@ class WhereItPays:
                 loops = None
             self._loaded.append(loops)
         return self._loaded[0]
+
+    def _is_made(self) -> bool:
+        """Tells whether the loops are compiled already; that asks for an import of numba, 1 s, if they may be only."""
+        spec = find_spec(self._name)
+        file = Path((spec and spec.origin) or self._name)
+        if not any((file.parent / "__pycache__").glob(f"{file.stem}-*/{MADE}*")):
+            return False
+        try:
+            return import_module(self._name).is_made()
+        except Exception:  # as above
+            return False
 
     def forget(self) -> None:
         """Has the module looked for anew when it is next asked for."""

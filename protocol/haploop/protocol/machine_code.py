@@ -6,12 +6,17 @@ The same operations in the same order give the same bits as Python and NumPy.
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 from shutil import rmtree
 from types import FunctionType, ModuleType
 from typing import Any
+
+# How the name of the file begins by which it is known that the machine code beside it is whole.
+MADE = "made-"
 
 
 class MachineCode:
@@ -56,7 +61,7 @@ class MachineCode:
             settings.CACHE_DIR = before
 
     def try_out(self, function: Callable[[], object]) -> None:
-        """Calls a function that compiles the loops, or loads them.
+        """Calls a function that compiles the loops, or loads them, and marks what is kept as made.
 
         Raises whatever numba does; the next process then finds no machine code kept, which may be damaged.
         """
@@ -65,3 +70,20 @@ class MachineCode:
         except Exception:
             rmtree(self.kept, ignore_errors=True)
             raise
+        if self.kept and not self.is_made():
+            with suppress(OSError):
+                self._mark.touch()
+
+    def is_made(self) -> bool:
+        """Tells whether the loops were compiled before, for this processor, so that to load them is a matter of 1 s."""
+        return bool(self.kept) and self._mark.exists()
+
+    @property
+    def _mark(self) -> Path:
+        import numba  # pyright: ignore[reportMissingImports]
+        import numba.core.registry  # pyright: ignore[reportMissingImports]
+
+        registry: Any = numba.core.registry
+        processor = registry.cpu_target.target_context.codegen().magic_tuple()
+        made_for = numba.__version__, sys.implementation.cache_tag, processor
+        return Path(self.kept, MADE + sha256(repr(made_for).encode()).hexdigest()[:16])

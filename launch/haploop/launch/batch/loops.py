@@ -173,6 +173,11 @@ def _or_numpy(loop: Callable[..., Any], plain: Callable[..., Any]) -> Callable[.
     return does
 
 
+def is_made() -> bool:
+    """Tells whether the loops were compiled before, on this processor, and only have to be loaded."""
+    return _code.is_made()
+
+
 def try_out() -> None:
     """Compiles the loops, or loads them, for numbers that all members share; raises whatever numba does."""
     _code.try_out(_try_out)

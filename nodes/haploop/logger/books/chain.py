@@ -55,6 +55,8 @@ class ChainBooks:
         self._constant = constant_forces(scene)
         works = [f"{name}_work" for name in self._constant]
         self.names = ["hand_work", *self._heats, *friction, "kinetic", "spring", *actuator, *works]
+        if members is None:  # a run that is long enough has its loops loaded before it begins
+            LOOPS.module_for(time.ticks * self._n)
 
     def increments(
         self, first_step: int, columns: BatchColumns, moved: Displacement, commanded: Iterable[np.ndarray]

@@ -167,6 +167,11 @@ def pairs_of(forms: np.ndarray) -> np.ndarray:
     return table
 
 
+def is_made() -> bool:
+    """Tells whether the loops were compiled before, on this processor, and only have to be loaded."""
+    return _code.is_made()
+
+
 def try_out() -> None:
     """Compiles the loop, or loads it; raises whatever numba does."""
     one = np.zeros(1)

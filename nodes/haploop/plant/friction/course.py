@@ -105,6 +105,11 @@ class Course:
         return rows[:, : self._size], rows[:-1, size], rows[:-1, size + 4 :]
 
 
+def is_made() -> bool:
+    """Tells whether the loops were compiled before, on this processor, and only have to be loaded."""
+    return loops.is_made() and _code.is_made()
+
+
 def try_out() -> None:
     """Compiles all loops, or loads them; raises whatever numba does."""
     loops.try_out()

@@ -245,6 +245,11 @@ def _ends_of(counts: tuple[int, ...]) -> np.ndarray:
     return np.cumsum(counts)
 
 
+def is_made() -> bool:
+    """Tells whether the loops were compiled before, on this processor, and only have to be loaded."""
+    return _code.is_made()
+
+
 def try_out() -> None:
     """Compiles the loops, or loads them; raises whatever numba does."""
     _code.try_out(_try_out)

@@ -67,6 +67,11 @@ def move(moves, of_friction, most, v, loads, held, states, at_ends):  # pragma: 
                     x[j] = before[j] if was[j] == 0.0 else x[j]
 
 
+def is_made() -> bool:
+    """Tells whether the loops were compiled before, on this processor, and only have to be loaded."""
+    return _code.is_made()
+
+
 def try_out() -> None:
     """Compiles the loop, or loads it; raises whatever numba does."""
     _code.try_out(_try_out)

@@ -51,9 +51,9 @@ _BELOW = {
 Each cell names the cheapest setting, or all that are as cheap, and the time of the first. Below the error in the last
 column no method was found that takes less time than the exact flow. Friction is what makes a tick dear: the exact
 flow finds each stop and start to the last digit, the one-step methods let them fall on plant steps and have an error
-of first order, whatever their own order is. Rows of *machine code* are with the extra `numba`, which a run in one
-process of 20 s or more, a sweep and `advise` use for the exact flow with friction, to the same bits; all others, and
-all times below, are of Python and NumPy alone, as the nodes of a live run are.
+of first order, whatever their own order is. Rows of *machine code* are with the extra `numba`, which sweeps, `advise`
+and runs of 20 s or more use for the exact flow with friction, to the same bits; all others, and all times below, are of
+Python and NumPy alone.
 
 ![Error of each method against the time of a tick, scene by scene]({FIGURE})""",
     "alike": """\
