@@ -45,10 +45,21 @@ class SceneError(ValueError):
     """A scene that cannot be run; it holds every mistake."""
 
     def __init__(self, mistakes: Iterable[Mistake]) -> None:
-        self.mistakes = list(dict.fromkeys(mistakes))
+        self.mistakes = _without_twins(list(dict.fromkeys(mistakes)))
         told = [str(mistake) for mistake in self.mistakes[:_MOST_TOLD]]
         more = len(self.mistakes) - len(told)
         super().__init__("\n".join([*told, f"... and {counted(more, 'more mistake')}."] if more else told))
+
+
+def _without_twins(mistakes: list[Mistake]) -> list[Mistake]:
+    """Returns mistakes without the keys that are missing only because they are misspelt in the same table."""
+    meant = {(_split(one.key)[0], one.nearest) for one in mistakes if one.nearest and "is not a key" in one.given}
+    return [one for one in mistakes if one.given != "is missing" or _split(one.key) not in meant]
+
+
+def _split(key: str) -> tuple[str, str]:
+    table, _, name = key.rpartition(".")
+    return table, name
 
 
 def counted(count: int, name: str) -> str:
