@@ -59,6 +59,23 @@ def log_ticks(path, ticks):
             log.write(channel, np.arange(ticks) * 1_000_000, np.stack([*columns.values()], axis=-1))
 
 
+@pytest.mark.parametrize("step", [1, 7, 100])
+def test_the_overview_reaches_from_the_first_sample_to_the_newest_after_every_step(step):
+    history = History(TIME, 0)
+    for tick in range(0, 700, step):
+        rows = np.arange(10.0 * tick, 10.0 * (tick + step) + 1.0)
+        history.append_plant_block(tick, {"x": rows, "v": rows, "force": rows})
+        x = drawn(history)["tables"]["overview"]["values"]["x"]
+        assert (np.nanmin(x), np.nanmax(x)) == (0.0, rows[-2]), tick
+
+
+def test_before_the_plant_is_heard_there_is_no_overview():
+    history = History(TIME, 0)
+    row = np.arange(5.0)
+    history.append_ticks(300, {"x": row, "v": row, "wall": row, "total": row}, AtWork((), WALL))
+    assert "overview" not in drawn(history)["tables"]
+
+
 def test_a_log_that_is_not_there_yet_is_looked_for_again(tmp_path, monkeypatch):
     """A viewer that is welcomed together with the logger may be the quicker of the two."""
     monkeypatch.setattr(viewer, "_LOGGED_S", 0.01)

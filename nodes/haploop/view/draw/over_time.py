@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
-from functools import lru_cache
 
 import numpy as np
 
@@ -129,20 +128,13 @@ def over_time(history: History, interval: Interval) -> list[Table | None]:
     return [interval.table(*made(history)) for made in (_position, _force, _energy)]
 
 
-def overview(history: History) -> Table:
-    """Returns the position over the whole run, the two extremes of each of its parts that is complete."""
+def overview(history: History) -> Table | None:
+    """Returns the position over the whole run; None before anything of it is known."""
     first, end = history.first_tick or 0, history.steps.end_tick
-    bucket = 1 << max(0, math.ceil(math.log2(max(1, end - first) / _OVERVIEW_PARTS)))
-    bucket = history.steps.bucket_from(first, bucket)
-    begins = history.steps.aligned(first, bucket)
-    return _overview(history, begins, max(begins + bucket, end - (end - begins) % bucket), bucket)
-
-
-@lru_cache(maxsize=1)
-def _overview(history: History, begins: int, end: int, bucket: int) -> Table:
-    values, rate = history.steps.envelope(["x"], begins, end, bucket), history.time.control_rate
-    columns = [Column("x", "m", "position")]
-    return Table("overview", (begins + bucket / 4.0) / rate, bucket / 2.0 / rate, columns, values, envelope=True)
+    if first >= end:
+        return None
+    whole = Interval(first, end, history.time.control_rate, _OVERVIEW_PARTS)
+    return whole.table("overview", [(history.steps, {"x": Column("x", "m", "position")})])
 
 
 def laid_over(history: History, from_s: float, to_s: float, points: int) -> list[Table | None]:
