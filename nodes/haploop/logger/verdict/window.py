@@ -21,7 +21,7 @@ from haploop.protocol.trees import tree_select
 
 CONTROLLER_COLUMNS = ("x", "total", "in_contact", "wall_position")
 # Members whose windows are laid out together: reading one member alone out of a wide array is slow.
-_TOGETHER = 32
+TOGETHER = 32
 
 
 def keep_steps(plant_rate: int) -> int:
@@ -95,8 +95,8 @@ class Window:
         wanted = np.fromiter(places, np.intp)
         n, rate, s = self._time.steps_per_tick, self._time.plant_rate, self.state
         span = window_span(s.steps, keep_steps(rate), n)
-        for first in range(0, len(wanted), _TOGETHER):
-            some = wanted[first : first + _TOGETHER]
+        for first in range(0, len(wanted), TOGETHER):
+            some = wanted[first : first + TOGETHER]
             x = last_rows(s.x, s.steps + len(s.x), some)
             rows = {name: last_rows(ring, s.steps // n, some) for name, ring in s.rows.items()}
             swing_m = self.swing_m[some]

@@ -13,7 +13,10 @@ import numpy as np
 from haploop.launch.batch.jax.block import Rings
 from haploop.logger.verdict.measures import ROUNDING, MeasuredColumns, RunMeasures, window_measures, window_span
 from haploop.logger.verdict.ripple import peak_to_peak, ripple
-from haploop.logger.verdict.window import Window, keep_steps, last_rows
+from haploop.logger.verdict.window import TOGETHER, Window, keep_steps, last_rows
+
+# Steps that a program goes through in one piece, so that what it carries from step to step stays in registers.
+_UNROLLED = 5
 
 
 class CompiledWindow(Window):
@@ -44,7 +47,9 @@ class CompiledWindow(Window):
         stiffness, depth = _where_any(*means[:2]), _where_any(*means[2:])
         # Gone through once a run: a transform by NumPy costs less than a program for it.
         command = last_rows(np.asarray(self.rings.rows["total"]), steps // n, wanted)[:, -span.ticks :]
-        forces = ripple(command, self._time.control_rate).tolist(), peak_to_peak(command).tolist()
+        parts = [command[first : first + TOGETHER] for first in range(0, len(command), TOGETHER)]
+        ripples = np.concatenate([ripple(part, self._time.control_rate) for part in parts])
+        forces = ripples.tolist(), peak_to_peak(command).tolist()
         measured = MeasuredColumns(crossings, growth, width, inside, stiffness, depth, *forces)
         yield from map(
             RunMeasures, window_measures(measured, span, rate), self.extremes(wanted), self.swing_m[wanted].tolist()
@@ -87,7 +92,7 @@ def _look(x: Any, rows: dict[str, jax.Array], ran: Any, swing_m: Any, *, steps: 
         return total + away, weighted + middle * away, jnp.minimum(low, away), jnp.maximum(high, away)
 
     pivot, none, far = at(0), jnp.zeros(members), jnp.full(members, jnp.inf)
-    total, weighted, low, high = jax.lax.fori_loop(0, steps, sums, (none, none, far, -far))
+    total, weighted, low, high = jax.lax.fori_loop(0, steps, sums, (none, none, far, -far), unroll=_UNROLLED)
     slope, mean = weighted / (steps * (steps**2 - 1) / 12.0), total / steps
 
     def swing(i: Any, so_far: _Swings) -> _Swings:
@@ -96,8 +101,9 @@ def _look(x: Any, rows: dict[str, jax.Array], ran: Any, swing_m: Any, *, steps: 
         crossings = so_far.crossings + (side * so_far.side < 0.0)
         return _Swings(side, crossings, jnp.minimum(so_far.low, offset), jnp.maximum(so_far.high, offset))
 
-    first = jax.lax.fori_loop(0, steps // 2, swing, _Swings(none, jnp.zeros(members, np.int64), far, -far))
-    second = jax.lax.fori_loop(steps // 2, steps, swing, first._replace(low=far, high=-far))
+    begun = _Swings(none, jnp.zeros(members, np.int64), far, -far)
+    first = jax.lax.fori_loop(0, steps // 2, swing, begun, unroll=_UNROLLED)
+    second = jax.lax.fori_loop(steps // 2, steps, swing, first._replace(low=far, high=-far), unroll=_UNROLLED)
     before = first.high - first.low
     growth = jnp.where(before > 0.0, (second.high - second.low) / before, 0.0)
     return [second.crossings, growth, high - low, *_in_contact(rows, ran // n, ticks)]
