@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 from pydantic_core import PydanticCustomError
@@ -87,6 +87,19 @@ def test_other_numbers_make_the_scene_or_the_refusal_that_reading_all_of_it_make
             assert base.as_dict(found) == found.as_dict()
             assert base.text(found) == to_toml(found.as_dict())
     assert 10 < sum(made) < 200
+
+
+def test_a_cell_reads_the_declarations_of_its_elements_only_where_events_may_set_them() -> None:
+    class Unread(KINDS["damping"]):
+        @classmethod
+        def parameters(cls) -> NoReturn:
+            raise LookupError
+
+    numbers, kinds = {"dissipation.0.damping": 2.0}, {**KINDS, "damping": Unread}
+    of = {"dissipation": [{"kind": "damping", "damping": 1.0}]}
+    assert Base(scene(**of).in_order()).with_numbers(numbers, kinds).dissipation[0].parameters == {"damping": 2.0}
+    with pytest.raises(LookupError):
+        Base(scene(**of, **BASES["events"]).in_order()).with_numbers(numbers, kinds)
 
 
 @pytest.mark.parametrize("values", NAMES, ids=str)
