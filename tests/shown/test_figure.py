@@ -229,6 +229,14 @@ def test_the_header_tells_verdict_and_numbers(runs: dict[str, Path]) -> None:
     assert "pushed, it swings less than 1 nm peak to peak, felt" in key_numbers(data)
 
 
+def test_the_header_tells_the_window_as_the_end_only_where_it_is(runs: dict[str, Path]) -> None:
+    """Of a run that failed the log may hold more than the logger had summed up."""
+    data = RunData.from_directory(runs["swap"])
+    assert key_numbers(data)[0].startswith("in the last 0.5 s: ")
+    data.summary |= {"duration_s": 0.7, "window": {**data.summary["window"], "from_s": 0.2}}
+    assert key_numbers(data)[0].startswith("from 0.2 to 0.7 s: ")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.4, 0.8])
 def test_a_run_that_was_killed_still_draws(runs: dict[str, Path], tmp_path: Path, share: float) -> None:

@@ -94,7 +94,11 @@ def key_numbers(run: RunData) -> list[str]:
     if not run.summary:
         return [f"{'log cut off' if run.cut else 'no summary'}: {last - first:g} s of {run.scene.duration:g} s"]
     window, energy = run.summary["window"], run.summary["energy"]
-    words = [f"in the last {last - window['from_s']:.3g} s: oscillation {amount(window['oscillation_m'], 'm')}"]
+    # Of a run that failed the log may hold more than the window saw.
+    from_s, to_s = window["from_s"], run.summary["duration_s"]
+    is_end = last - to_s < 1.5 / run.control_rate
+    when = f"in the last {last - from_s:.3g} s" if is_end else f"from {from_s:.3g} to {to_s:.3g} s"
+    words = [f"{when}: oscillation {amount(window['oscillation_m'], 'm')}"]
     if (swing_N := window.get("force_swing_N")) is not None:
         words[0] += f", force {amount(swing_N, 'N')} peak to peak"
     if (found := run.summary.get("stability", {})).get("rate_1_s") is not None:
