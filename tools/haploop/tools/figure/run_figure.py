@@ -151,7 +151,8 @@ def book_rows(run: RunData, books: list[Book]) -> list[Row]:
     for book in [*shown[:_MOST_BOOKS], *together]:
         name, at_work = book.name, ""
         if span := spans.get(book.name):
-            name = f"{book.name} ({parameters(span.element.as_dict(), run.units)})"
+            told = parameters(span.element.as_dict(), run.units)
+            name = f"{book.name} ({told})" if told else book.name
             end_s = min(span.to_tick / run.control_rate, run.span_s[1])
             at_work = f"{span.from_tick / run.control_rate:g}–{end_s:g}"
         true, sampled = (amount(value, "J") for value in book.ends_J)
