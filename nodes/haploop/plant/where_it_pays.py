@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,11 +21,23 @@ class WhereItPays:
     Attributes:
         may_wait: whether this process may wait until they are compiled, 16 s, or a minute on a busy machine: not the
             nodes of a run, which have deadlines and load what is made already; runs in one process and batches set it.
+        is_off: whether all does without: set by :meth:`none` alone.
         pays: from how much on it pays.
         asked: how much was to be done so far.
     """
 
     may_wait: ClassVar[bool] = False
+    is_off: ClassVar[bool] = False
+
+    @classmethod
+    @contextmanager
+    def none(cls) -> Iterator[None]:
+        """Has all that is made meanwhile do without loops of machine code."""
+        before, cls.is_off = cls.is_off, True
+        try:
+            yield
+        finally:
+            cls.is_off = before
 
     def __init__(self, module: str, pays: float) -> None:
         self.pays, self.asked = pays, 0
@@ -32,7 +46,8 @@ class WhereItPays:
     def module_for(self, amount: int) -> Any:
         """Returns the module where it pays with so much more to do, and may be waited for, and works; else None."""
         self.asked += amount
-        return self.module() if self.asked >= self.pays and (self.may_wait or self._is_made()) else None
+        pays = self.asked >= self.pays and not self.is_off
+        return self.module() if pays and (self.may_wait or self._is_made()) else None
 
     def module(self) -> Any:
         """Returns the module, or None where it does not work."""

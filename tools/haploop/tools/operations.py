@@ -19,6 +19,7 @@ from haploop.launch.plan.effect import Effect
 from haploop.launch.plan.effects import effects_of
 from haploop.launch.plan.plan import multiplications
 from haploop.plant.plant import Plant
+from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
@@ -96,7 +97,8 @@ def operations(scene: Scene, kinds: Kinds) -> Operations:
     A shorter run is counted over its second half.
     """
     time = Timebase.from_scene(scene)
-    plant, controller = Plant(scene, time), Controller(scene, time, kinds)
+    with WhereItPays.none():  # which has no instructions
+        plant, controller = Plant(scene, time), Controller(scene, time, kinds)
     counter = _Counter()
     counts: list[tuple[int, int]] = []
 

@@ -19,6 +19,8 @@ _SETTLED = 0.002
 # After so long, and so many periods, a slow change counts as none, and a steady growth as one.
 _LONG_S = 8.0
 _COUNTED_PERIODS = 60.0
+# One that decays by less than this, in 1/s, would hardly be seen to, and a loop a little off might not.
+_DIES_1_S = 0.01
 # After so long, swings of both sizes that grow alike grow for good, and what is known not to change lasts.
 _ALIKE_S = 4.0
 # A swing of the loop that is wider than that of its run by more than this has not been seen in it.
@@ -49,6 +51,7 @@ WHY = {
     "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",
     "leaves the limit": "Its swing grew until the device was beyond its limit.",
     "failed": "The loop failed while it was watched: {detail}",
+    "rests and swings": "After a push of {push_N:.3g} N it came to rest.",
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
     "too slow": "Of its swings of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz the steadier changes by "
     "{rate_1_s:.2g} +- {error_1_s:.2g} 1/s, too slowly, or too unlike the other, to tell within {watched_s:g} s; "
@@ -57,7 +60,7 @@ WHY = {
 # What is said beside that after a blow, and how the words for its finding are told.
 AFTER_BLOW = {
     "rests": " It did after {blow_N:.3g} N, too.",
-    "swings on": " After a harder blow, of {blow_N:.3g} N, it swings on.",
+    "swings on": " After a harder blow, of {blow_N:.3g} N, it swings on: either may come of how it is touched.",
     "undecided": " Whether it does after a harder blow, of {blow_N:.3g} N, could not be told.",
 }
 _BLOWN = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on"}
@@ -106,8 +109,9 @@ class Finding:
     detail: str = ""
 
     def after_blow(self, found: Finding) -> Finding:
-        """Returns the finding with what was found after a harder push."""
-        return replace(self, blow_N=found.push_N, blown=_BLOWN.get(found.word, found.word))
+        """Returns the finding with what was found after a harder push: undecided where that swings on."""
+        struck = replace(self, blow_N=found.push_N, blown=_BLOWN.get(found.word, found.word))
+        return replace(struck, word="undecided", why="rests and swings") if struck.blown == "swings on" else struck
 
     def entries(self, seen_m: float | None = None, beside: Sequence[str] = ()) -> dict[str, Any]:
         """Returns what a summary tells of it: the word, why as a sentence, and the numbers as its ``stability``.
@@ -147,8 +151,8 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     """Returns the finding; ``undecided`` asks for a longer time unless it is the ``last`` one.
 
     *steady*: the swing died, or dies or lasts and what is left of it no hand feels, or at the last look both swings
-    still decay alike. *limit-cycle*: it forgets how hard it was pushed, yet remains, and is felt. *growing*: both
-    swings grow. Of swings of fewer than six periods nothing is said.
+    still decay alike, to a third within 100 s. *limit-cycle*: it forgets how hard it was pushed, yet remains, and is
+    felt. *growing*: both swings grow. Of swings of fewer than six periods nothing is said.
     """
     if not swing.inside:
         return Finding("undecided", "leaves the wall", swing.push_N, swing.watched_s)
@@ -182,7 +186,8 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     soon = swing.watched_s >= _ALIKE_S and min(swing.changes) > _LASTING and swing.is_alike()
     if grows and (soon or (is_long and (min(swing.changes) > _LASTING_LONG or swing.is_alike()))):
         return _finding(swing, "growing", "grows")
-    decays = last and all(change < -3 * error for change, error in changes) and swing.is_alike()
+    dies = -_DIES_1_S * swing.watched_s / 2.0
+    decays = last and all(change < min(dies, -3 * error) for change, error in changes) and swing.is_alike()
     if decays and swing.smooth and not is_felt(_COUNTS * swing.count_m, swing.frequency_Hz):
         return _finding(swing, "steady", "decays")
     return _finding(swing, "undecided", "too slow")

@@ -51,7 +51,7 @@ def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s:
     """Judges members that touch the wall."""
     push_N = np.array([push_of(hold) for hold in hold_N])
     found, asked = _watched(end, members, hold_N, push_N, (SMALLER, 1.0), looks_s)
-    struck = [place for place, each in enumerate(found) if is_struck(end.scenes[members[place]], each)]
+    struck = [place for place, each in enumerate(found) if is_struck(each)]
     if struck:
         blows, _ = _watched(end, members[struck], hold_N[struck], push_N[struck] * BLOW, (1.0,), looks_s)
         for place, blow in zip(struck, blows, strict=True):

@@ -50,13 +50,13 @@ def push_of(hold_N: float) -> float:
     return PUSH * max(abs(hold_N), _LEAST_LOAD_N) * (1.0 if hold_N > 0.0 else -1.0)
 
 
-def is_struck(scene: Scene, found: Finding) -> bool:
-    """Tells whether a loop that came to rest is struck as well: friction may hold a swing that a blow sets off.
+def is_struck(found: Finding) -> bool:
+    """Tells whether a loop is struck as well, since what rests after a push may swing on after a blow.
 
-    So may an actuator that saturates, whose wall gives way to a wide swing.
+    Friction holds a swing that is small; an actuator that saturates gives way to one that is wide, as an element that
+    switches does, and off the wall there is none of it.
     """
-    saturates = scene.actuator is not None and scene.actuator.saturation is not None
-    return found.word == "steady" and found.why != "decays" and (scene.friction is not None or saturates)
+    return found.word == "steady" and found.why != "decays"
 
 
 def moved_beside(scene: Scene, from_s: float) -> list[str]:

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 _ITS_WORD = "That the {} does what the scene says is its own word; haploop replay holds it against the scene."
 _TRIED = "this hold, pushed by up to {}; haploop advise tries taps, other holds and devices"
-_SWINGS_ON = "Steady for small pushes alone: after the blow it swings on."
 # Entry of the summary, the count in it, and its words.
 _COUNTS = (
     ("lost", "commands_dropped", "commands dropped"),
@@ -70,8 +69,7 @@ def summary_table(summary: Summary) -> RenderableType:
     parts: list[RenderableType] = [head, Text(f"{rule[:1].upper()}{rule[1:]}.", style="dim")]
     if summary["ended"] not in ("done", "diverged"):
         parts.append(Text(f"ended early: {summary['ended']}", style="bold red"))
-    swings_on = [_SWINGS_ON] * (summary.get("stability", {}).get("blown") == "swings on")
-    told_too = [*summary.get("not_made", ()), *swings_on, *filter(None, [summary["energy"].get("balance")])]
+    told_too = [*summary.get("not_made", ()), *filter(None, [summary["energy"].get("balance")])]
     parts += [Text(sentence, style="bold yellow") for sentence in told_too]
     parts += [Text(_ITS_WORD.format(words.split()[0])) for words, _ in _programs(summary)]
     control_rate = summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
