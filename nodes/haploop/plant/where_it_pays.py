@@ -9,8 +9,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, ClassVar
 
-from haploop.protocol.machine_code import MADE
-
 
 class WhereItPays:
     """A module of loops of machine code, loaded once so much was to be done in this process: sooner it costs more.
@@ -62,6 +60,8 @@ class WhereItPays:
 
     def _is_made(self) -> bool:
         """Tells whether the loops are compiled already; that asks for an import of numba, 1 s, if they may be only."""
+        from haploop.protocol.machine_code import MADE
+
         spec = find_spec(self._name)
         file = Path((spec and spec.origin) or self._name)
         if not any((file.parent / "__pycache__").glob(f"{file.stem}-*/{MADE}*")):
