@@ -71,6 +71,29 @@ def test_a_loop_that_friction_stops_after_a_push_but_not_after_a_blow_is_not_cal
     assert f"{finding.blow_N:.3g} N" in finding.sentence()
 
 
+HELD = {
+    "duration": 4.0,
+    "clock": {"round_trip_delay": 0.001},
+    "device": {"mass": 0.15, "damping": 0.3, "position": -0.00522},
+    "friction": {"kinetic": 0.08},
+    "encoder": {"resolution": 2e-5},
+    "actuator": {"saturation": 8.0},
+    "hand": {"mass": 0.01, "damping": 0.5, "stiffness": 10.0, "force": {"kind": "constant", "value": -0.6}},
+    "wall": {"position": -0.005, "stiffness": 2500.0},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("held_N", [-0.6, -0.62, -0.7])
+def test_a_wall_that_friction_holds_until_it_is_tapped_is_not_called_steady(held_N):
+    """A tap of 1.8 N for 10 ms sets it swinging by 1.6 mm for good; a blow into it of as much for 50 ms does not."""
+    tap = {"kind": "trace", "time": [0.0, 1.0, 1.005, 1.01], "force": [held_N, held_N, held_N - 1.8, held_N]}
+    at_rest, tapped = ({**HELD, "hand": {**HELD["hand"], "force": force}} for force in (
+        {"kind": "constant", "value": held_N}, tap))  # fmt: skip
+    assert word(**at_rest) == "undecided"
+    assert word(**tapped) == "limit-cycle"
+
+
 def test_a_device_that_nobody_holds_at_the_wall_is_undecided():
     thrown = {"mass": 0.1, "damping": 0.0, "position": 0.01, "velocity": -0.1}
     finding = found(scene(**{**PLAIN, "device": thrown, "duration": 0.15}))

@@ -51,7 +51,7 @@ WHY = {
     "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",
     "leaves the limit": "Its swing grew until the device was beyond its limit.",
     "failed": "The loop failed while it was watched: {detail}",
-    "rests and swings": "After a push of {push_N:.3g} N it came to rest.",
+    "rested": "After a push of {push_N:.3g} N it came to rest.",
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
     "too slow": "Of its swings of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz the steadier changes by "
     "{rate_1_s:.2g} +- {error_1_s:.2g} 1/s, too slowly, or too unlike the other, to tell within {watched_s:g} s; "
@@ -59,7 +59,7 @@ WHY = {
 }
 # What is said beside that after a blow, and how the words for its finding are told.
 AFTER_BLOW = {
-    "rests": " It did after {blow_N:.3g} N, too.",
+    "rests": " It did after blows of {blow_N:.3g} N for 0.05 s, into the wall and off it, too.",
     "swings on": " After a harder blow, of {blow_N:.3g} N, it swings on: either may come of how it is touched.",
     "undecided": " Whether it does after a harder blow, of {blow_N:.3g} N, could not be told.",
 }
@@ -86,8 +86,8 @@ class Finding:
         needs_s: estimate of the time after which a swing that changes too slowly is told; None otherwise.
         most_1_s: what either swing may grow or decay by: its rate and two standard errors, of the one that may change
             most; None where it was not watched to an answer.
-        blow_N: of a loop that rests after the push, a harder one; None if not asked.
-        blown: what it does after that: rests, swings on, or undecided.
+        blow_N: of a loop that rests after the push, a harder one, into the wall and off it; None if not asked.
+        blown: what it does after these: rests, swings on, or undecided.
     """
 
     word: str
@@ -109,9 +109,9 @@ class Finding:
     detail: str = ""
 
     def after_blow(self, found: Finding) -> Finding:
-        """Returns the finding with what was found after a harder push: undecided where that swings on."""
-        struck = replace(self, blow_N=found.push_N, blown=_BLOWN.get(found.word, found.word))
-        return replace(struck, word="undecided", why="rests and swings") if struck.blown == "swings on" else struck
+        """Returns the finding with what was found after a harder push: undecided unless it rests then, too."""
+        struck = replace(self, blow_N=found.push_N, blown=_BLOWN.get(found.word, "undecided"))
+        return struck if struck.blown == "rests" else replace(struck, word="undecided", why="rested")
 
     def entries(self, seen_m: float | None = None, beside: Sequence[str] = ()) -> dict[str, Any]:
         """Returns what a summary tells of it: the word, why as a sentence, and the numbers as its ``stability``.
@@ -170,7 +170,7 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     # What dies behind an encoder whose counts still move may leave a chatter of them that is felt.
     settles = falling and swing.count_m > 0.0 and swing.ripple_N > _STILL_N and not is_long
     if unfelt and seen and not (rising or goes_on or settles):
-        return _finding(swing, "steady", "unfelt")
+        return _finding(swing, "steady", "unfelt" if swing.width_m >= REST_M else "rest")
     if not swing.covers:
         return _finding(swing, "undecided", "too slow")
     if forgets:

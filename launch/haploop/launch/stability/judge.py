@@ -14,7 +14,7 @@ from haploop.launch.scene.events import scene_events
 from haploop.launch.stability.decide import Finding
 from haploop.launch.stability.looks import (
     BESIDE,
-    BLOW,
+    BLOWS,
     PATIENT_S,
     SMALLER,
     failed,
@@ -129,7 +129,7 @@ def judge(end: End, looks_s: Sequence[float] = PATIENT_S) -> Finding:
     The hand is held still with the mean force of its last contacts, noise is switched off, and two copies of the loop
     are pushed, one ten times as hard as the other. Whatever moves a second later is the loop's own. Most loops tell
     within a second or two; slow ones are watched to the last look. It takes as long as simulating that time twice. One
-    that comes to rest is struck, too, which takes half as long again.
+    that comes to rest is struck, too, into the wall and off it, which takes as long again.
     """
     push_N = push_of(end.hold_N)
     found, x = _watched(end, (push_N * SMALLER, push_N), looks_s)
@@ -137,8 +137,9 @@ def judge(end: End, looks_s: Sequence[float] = PATIENT_S) -> Finding:
         beside = StillHand(end, push_N * (1.0 + BESIDE))
         beside.go_to(found.watched_s)
         return replace(found, chaotic=parts(x, beside.x, found.width_m))
-    if is_struck(found):
-        return found.after_blow(_watched(end, (push_N * BLOW,), looks_s)[0])
+    for blow in BLOWS:
+        if is_struck(found):
+            found = found.after_blow(_watched(end, (push_N * blow,), looks_s)[0])
     return found
 
 

@@ -11,7 +11,7 @@ from haploop.launch.batch.batch import BatchEnd
 from haploop.launch.stability.decide import Finding
 from haploop.launch.stability.looks import (
     BESIDE,
-    BLOW,
+    BLOWS,
     LOOKS_S,
     SMALLER,
     failed,
@@ -51,11 +51,11 @@ def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s:
     """Judges members that touch the wall."""
     push_N = np.array([push_of(hold) for hold in hold_N])
     found, asked = _watched(end, members, hold_N, push_N, (SMALLER, 1.0), looks_s)
-    struck = [place for place, each in enumerate(found) if is_struck(each)]
-    if struck:
-        blows, _ = _watched(end, members[struck], hold_N[struck], push_N[struck] * BLOW, (1.0,), looks_s)
-        for place, blow in zip(struck, blows, strict=True):
-            found[place] = found[place].after_blow(blow)
+    for blow in BLOWS:
+        if struck := [place for place, each in enumerate(found) if is_struck(each)]:
+            blows, _ = _watched(end, members[struck], hold_N[struck], push_N[struck] * blow, (1.0,), looks_s)
+            for place, of_blow in zip(struck, blows, strict=True):
+                found[place] = found[place].after_blow(of_blow)
     return _with_chaos(end, members, hold_N, push_N, found, asked)
 
 

@@ -14,8 +14,8 @@ from haploop.protocol.walls.wall import Wall
 
 # The larger push, as a share of what the hand holds the wall with, and the smaller one, as a share of it.
 PUSH, SMALLER = 0.3, 0.1
-# A blow, as a share of the larger push: three times what the hand holds the wall with.
-BLOW = 10.0
+# Blows, as a share of the larger push: three times what the hand holds the wall with, into it and off it.
+BLOWS = (10.0, -10.0)
 # Times since the push at which the loop is looked at, in s: of a run as part of it, and where somebody asks.
 LOOKS_S = (1.0, 2.0, 4.0, 8.0, 16.0)
 PATIENT_S = (*LOOKS_S, 32.0, 64.0)
