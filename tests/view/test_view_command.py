@@ -100,13 +100,13 @@ def test_the_browser_is_opened_with_a_link_that_holds_no_token(launched, tmp_pat
 def test_run_with_view_serves_the_run_and_stays_until_ctrl_c(launched, tmp_path, monkeypatch):
     """In real time; the run ends, the page shows its summary, and the viewer goes with the launcher."""
     monkeypatch.delenv("DISPLAY", raising=False)
-    run = launched("run", str(SCENE), "--set", "duration=1", "--view", "--json", out=tmp_path / "out")
+    run = launched("run", str(SCENE), "--set", "duration=4", "--view", "--json", out=tmp_path / "out")
 
     async def play(tab: Tab) -> dict[str, Any]:
         return await tab.phase("ended")
 
     state = browse(run, play)
-    assert state["summary"]["ticks"] == 1000
+    assert state["summary"]["ticks"] == 4000
     assert state["pace"] == 1.0
     run.says("Ctrl-C ends it")
     viewers = [pid for pid, parent, _, _ in processes() if parent == run.pid]
