@@ -91,7 +91,9 @@ def test_whoever_is_turned_away_before_a_first_word_can_be_said_is_told_why_and_
 
 
 @pytest.mark.slow
-def test_whoever_comes_with_keys_to_a_run_without_is_told_so(keys):
+def test_whoever_comes_with_keys_to_a_run_without_is_told_so(keys, monkeypatch):
+    """On a busy machine a handshake that is broken off may come before the one that tells why."""
+    monkeypatch.setattr(connection, "_TOLD_AFTER_S", 60.0)
     with listening(None) as address:
         assert "has no keys" in why(address, keys)
 
