@@ -70,8 +70,8 @@ class MachineCode:
         except Exception:
             rmtree(self.kept, ignore_errors=True)
             raise
-        if self.kept and not self.is_made():
-            with suppress(OSError):
+        with suppress(OSError, AttributeError):  # without the mark, nodes do without the loops
+            if self.kept and not self.is_made():
                 self._mark.touch()
 
     def is_made(self) -> bool:
