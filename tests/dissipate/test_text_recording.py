@@ -156,12 +156,48 @@ def test_positions_too_far_apart_for_metres_are_asked_after_unless_a_unit_says_s
     path = write(tmp_path / "mm.csv", {**columns, "position": 4.0 * columns["position"]})
     with pytest.raises(RecordingError, match=r"metres, millimetres or counts\? Give --unit m, mm or metres a count"):
         outcome(path, dampings=["1.0"])
-    for unit in ("mm", "m", "0.001"):
+    for unit in ("mm", "0.001"):
         assert not outcome(path, layout=Layout(length=unit), dampings=["1.0"]).recording.notes.remarks
     doubtful = write(tmp_path / "doubtful.csv", {**columns, "position": 0.5 * columns["position"]})
     assert any("taken for metres, 0.5 m" in words for words in note_sentences(outcome(doubtful, dampings=["1.0"])))
-    named = write(tmp_path / "named.csv", {"t": T, "x_m": 4.0 * columns["position"]})
-    assert not outcome(named, dampings=["1.0"]).recording.notes.remarks
+    named = write(tmp_path / "named.csv", {"t": T, "x_m": 0.5 * columns["position"]})
+    assert not any("taken for metres" in words for words in note_sentences(outcome(named, dampings=["1.0"])))
+
+
+F = 4.0 * np.sin(2.0 * np.pi * 15.0 * T)
+
+
+@pytest.mark.parametrize(
+    ("columns", "hardly"),
+    [
+        ({"t (s)": T, "x (m)": X, "F (N)": F}, []),
+        ({"t (ms)": 1e3 * T, "x (mm)": 1e3 * X, "F (mN)": 1e3 * F}, []),
+        ({"t (s)": T, "x (m)": 0.5 * np.sin(2.0 * T), "F (N)": F}, []),
+        ({"t (s)": T, "x (m)": 1e3 * X, "F (N)": F}, ["moves 4.00 m in all", "moves at"]),
+        ({"t (s)": T, "x (m)": 200 * X, "F (N)": F}, ["moves at"]),
+        ({"t (s)": T, "x (mm)": X, "F (N)": F}, ["moves 4.00 µm in all"]),
+        ({"t (s)": 1e3 * T, "x (m)": X, "F (N)": F}, ["samples 1.00 s apart"]),
+        ({"t (ms)": T, "x (m)": X, "F (N)": F}, ["samples 1.00 µs apart"]),
+        ({"t (s)": T, "x (m)": X, "F (mN)": F}, ["force of 4.00 mN at most"]),
+        ({"t (s)": T, "x (m)": X, "F (N)": 1e3 * F}, ["force of 4.00 kN at most"]),
+    ],
+)
+def test_a_unit_that_makes_of_the_numbers_what_no_device_does_is_asked_after(
+    tmp_path: Path, columns: dict[str, np.ndarray], hardly: list[str]
+) -> None:
+    path = write(tmp_path / "declared.csv", columns)
+    remarks = outcome(path, layout=Layout(force="F"), dampings=["1.0"]).recording.notes.remarks
+    assert len(remarks) == len(hardly), remarks
+    for words, remark in zip(hardly, remarks, strict=True):
+        assert words in remark
+        assert remark.startswith("Can that be meant")
+
+
+def test_a_unit_of_recorded_rates_is_asked_after_too(tmp_path: Path) -> None:
+    columns = {"t": T, "x": X, "v (m/s)": 1e3 * np.gradient(X, 1e-3), "a (m/s^2)": np.full(200, 9810.0)}
+    layout = Layout(velocity="v", acceleration="a")
+    remarks = outcome(write(tmp_path / "rates.csv", columns), layout=layout, dampings=["1.0"]).recording.notes.remarks
+    assert ["velocity of 188 m/s" in remarks[0], "acceleration of 9.81 km/s²" in remarks[1]] == [True, True], remarks
 
 
 def test_a_mass_that_may_be_in_grams_is_asked_after(plain: Path) -> None:

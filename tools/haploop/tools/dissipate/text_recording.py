@@ -11,6 +11,7 @@ import numpy as np
 
 from haploop.launch.scene.number import scale_of
 from haploop.tools.dissipate.delimited import Column, DelimitedFile
+from haploop.tools.dissipate.plausible import Largest
 from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
 
 # Names of columns that are looked for where none is given.
@@ -153,6 +154,7 @@ class TextRecording:
     def samples(self) -> Iterator[Samples]:
         """Yields all samples, in pieces without a gap."""
         last_s: float | None = None
+        largest = Largest(self.period_s)
         for columns, lines in self._rows():
             columns, lines = self._bridged(columns, lines)
             t = columns["time"]
@@ -172,12 +174,14 @@ class TextRecording:
                 x, v, a, force = (part.get(name) for name in ("position", "velocity", "acceleration", "force"))
                 assert x is not None
                 self._note_repeats(x)
+                largest.add(part)
                 begins = bool(is_gap[first])
                 unknown = self._unknown if begins and (first or last_s is not None) else 0
                 yield Samples(part["time"], x, v, a, x, None, begins, unknown=unknown, force_N=force)
             last_s = float(t[-1])
         if self.notes.rows < 2:
             raise RecordingError(f"{self._file.path} holds fewer than two samples.")
+        self.notes.remarks += largest.remarks()
         low, high = self._reach_m
         if not self._in_metres and high - low > _DOUBTFUL_M:
             self.notes.remarks.append(
