@@ -203,9 +203,8 @@ def test_the_answer_says_who_takes_most_and_who_feeds(tmp_path: Path) -> None:
     slow = write(tmp_path / "slow.csv", {"t": T, "x": 2e-3 * np.sin(2.0 * np.pi * 3.0 * T)})
     fast = write(tmp_path / "fast.csv", {"t": T, "x": 2e-5 * np.sin(2.0 * np.pi * 400.0 * T)})
     assert conclusion(outcome(slow, dampings=["2.7"])).startswith("damping 2.7 N s/m would have dissipated")
-    assert conclusion(outcome(fast, dampings=["2.7"])) == (
-        "none of these would have dissipated; all would have fed the motion."
-    )
+    fed = conclusion(outcome(fast, dampings=["2.7"]))
+    assert fed.startswith("none of these would have dissipated; all would have fed the motion. Not to be relied on")
     untouched = outcome(slow, dampings=["2.7"], wall="-20 mm")
     assert conclusion(untouched) == "none of these would have given a force on this motion."
     assert any("in contact with the wall only" in sentence for sentence in note_sentences(untouched))

@@ -20,6 +20,7 @@ from haploop.tools.cli.scenes import kinds_with
 from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.outcome import Outcome, Recording, Trace, make_outcome
+from haploop.tools.dissipate.position_noise import PositionNoise
 from haploop.tools.dissipate.report import make_report
 from haploop.tools.dissipate.samples import LogRecording, RecordingError, read_scene
 from haploop.tools.dissipate.text_recording import Layout, TextRecording
@@ -123,18 +124,23 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
                 f"The element {kind} answers to forces and energies of its loop, which a recorded motion has not; with "
                 "them it would have moved otherwise. Run it in a scene: haploop run."
             )
-    booking = Booking(scene, recording.period_s, recording.delay_s, kinds, recording.recorded, recording.has_force)
+    makings = scene, recording.period_s, recording.delay_s, kinds, recording.recorded, recording.has_force
+    booking, noisier = Booking(*makings), Booking(*makings)
+    # Of positions alone: what is recorded beside them does not come of their noise.
+    noise = PositionNoise() if isinstance(recording, TextRecording) and not recording.recorded else None
     trace = Trace(recording.period_s, 2 + 2 * len(scene.dissipation) + 3 * recording.has_force)
     end_x_m, shown = None, console(stderr=True)
     with shown.status(f"reading {request.path.name}") if shown.is_terminal else nullcontext() as line:
         for piece in recording.samples():
             trace.add(booking.add(piece))
+            if noise:
+                noisier.add(noise.added_to(piece))
             end_x_m = piece.end_x_m
             if line:
                 line.update(f"{request.path.name}: booked to {piece.t_s[-1]:.6g} s")
     if end_x_m is not None:
         booking.finish(end_x_m)
-    return make_outcome(recording, booking, trace, scene, kinds)
+    return make_outcome(recording, booking, trace, scene, kinds, noise and (noise.deviation_m, noisier.true_J))
 
 
 def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording, Scene]:

@@ -91,6 +91,7 @@ class ElementOutcome:
         sampled_J, true_J: its books at the end; positive: taken out of the device.
         taken_J, given_J: energy taken in the periods in which it dissipates, and given back in the others (true books).
         fast_share: of its mean square force, what is faster than a quarter of the sampling rate, see ``Booking``.
+        noisier_J: its true book on the positions with as much noise again as they have; None where rates were recorded.
     """
 
     kind: str
@@ -102,11 +103,17 @@ class ElementOutcome:
     given_J: float
     strongest_N: float
     fast_share: float
+    noisier_J: float | None = None
 
     @property
-    def is_noise(self) -> bool:
+    def is_fast(self) -> bool:
         """Tells whether much of its force is faster than a buzz at 0.15 of the sampling rate would make it."""
         return self.fast_share > 0.2
+
+    @property
+    def is_moved_by_noise(self) -> bool:
+        """Tells whether noise of the positions makes a tenth of its energy, as far as that is known."""
+        return self.noisier_J is not None and abs(self.noisier_J - self.true_J) > 0.1 * abs(self.true_J)
 
 
 @dataclass(frozen=True)
@@ -133,7 +140,8 @@ class ForceOutcome:
 class Outcome:
     """The outcome of the elements, in the order of their selection, on a recording, with the controller's scene.
 
-    ``force`` is that of a recorded force, None where there was none.
+    ``force`` is that of a recorded force, None where there was none; ``noise_m`` the noise that the recorded positions
+    have, None where rates were recorded beside them.
     """
 
     recording: Recording
@@ -141,6 +149,7 @@ class Outcome:
     trace: Trace
     scene: Scene
     force: ForceOutcome | None
+    noise_m: float | None
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -167,6 +176,7 @@ class Outcome:
             "delay_s": recording.delay_s,
             "between_samples": recording.between,
             "recorded": sorted(recording.recorded),
+            "noise_m": self.noise_m,
             "samples": notes.pop("rows"),
             **notes,
             "elements": [asdict(element) for element in self.elements],
@@ -175,8 +185,15 @@ class Outcome:
 
 
 def make_outcome(
-    recording: Recording, booking: Booking, trace: Trace, scene: Scene, kinds: Mapping[str, type[Element]]
+    recording: Recording,
+    booking: Booking,
+    trace: Trace,
+    scene: Scene,
+    kinds: Mapping[str, type[Element]],
+    noisier: tuple[float, Floats] | None,
 ) -> Outcome:
+    """Makes the outcome; ``noisier`` are the noise of the positions, m, and the true books with as much again."""
+    noise_m, noisier_J = (noisier[0], noisier[1].tolist()) if noisier else (None, [None] * len(scene.dissipation))
     columns = (
         booking.sampled_J,
         booking.true_J,
@@ -188,9 +205,13 @@ def make_outcome(
     books = np.array(columns).T.tolist()
     elements = [
         ElementOutcome(
-            table.name, {"acts": table.acts, **table.parameters}, _label(table, kinds[table.name].parameters()), *row
+            table.name,
+            {"acts": table.acts, **table.parameters},
+            _label(table, kinds[table.name].parameters()),
+            *row,
+            noisier_J=again,
         )
-        for table, row in zip(scene.dissipation, books, strict=False)
+        for table, row, again in zip(scene.dissipation, books, noisier_J, strict=False)
     ]
     force = None
     if of := booking.force:
@@ -198,7 +219,7 @@ def make_outcome(
         # The sign of a force in a log is known.
         is_signed = of.passivity == "other sign" and isinstance(recording, LogRecording)
         force = ForceOutcome(own, of.naive_J, "generated" if is_signed else of.passivity, of.excess_J)
-    return Outcome(recording, elements, trace, scene, force)
+    return Outcome(recording, elements, trace, scene, force, noise_m)
 
 
 def _label(table: ElementTable, declared: Mapping[str, tuple[Quantity, object]]) -> str:

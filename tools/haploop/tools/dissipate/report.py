@@ -33,10 +33,17 @@ _NAIVE = (
     "a thinned-out recording, is not. What is taken out of the device counts as positive. The sum F v T, v that at the "
     "sample (sampled books take the way after it), would say that the force {naive}: off by {off}{share}."
 )
-_NOISE = (
-    "{share} % of the force of {label} is faster than a quarter of the sampling rate. Unless the device buzzed as "
-    "fast, that is noise of the estimates, and so is much of its energy. Low-pass them, as by --set "
-    "acceleration.cutoff=20 or --set velocity.cutoff=50, until the energy no longer depends on it."
+_NOISY_POSITIONS = (
+    "The positions have noise of about {noise}, as their fastest changes tell. As much again would change the energy "
+    "of {elements}; about as much the noise that there is has changed it."
+)
+_FAST_FORCE = (
+    "{elements} is faster than a quarter of the sampling rate. Unless the device buzzed as fast, that is noise of the "
+    "estimates, and so may be much of the energy."
+)
+_LOW_PASS = (
+    "Low-pass the estimates, as by --set acceleration.cutoff=20 or --set velocity.cutoff=50, until the energy no "
+    "longer depends on it."
 )
 # An inertia above this, kg, is more often a mass in grams: the heaviest device that comes with haploop has 0.2 kg.
 _HEAVY_KG = 0.5
@@ -82,21 +89,25 @@ def conclusion(outcome: Outcome) -> str:
     """Returns who would have dissipated most, and who would have fed the motion; of a force alone its work."""
     if not outcome.elements and outcome.force:
         return _passivity(outcome)
-    best, *others = sorted(outcome.elements, key=lambda element: element.true_J, reverse=True)
     if not any(element.strongest_N for element in outcome.elements):
         return "none of these would have given a force on this motion."
+
+    words = _energies(outcome.elements)
+    if noisy := [element.label for element in outcome.elements if element.is_fast or element.is_moved_by_noise]:
+        words += f". Not to be relied on, since noise makes much of it: {', '.join(noisy)}"
+    return f"{words}."
+
+
+def _energies(elements: list[ElementOutcome]) -> str:
+    best, *others = sorted(elements, key=lambda element: element.true_J, reverse=True)
     if best.true_J <= 0.0:
-        return "none of these would have dissipated" + (
-            "; all would have fed the motion." if best.true_J < 0.0 else "."
-        )
+        return "none of these would have dissipated" + ("; all would have fed the motion" if best.true_J < 0.0 else "")
     words = f"{best.label} would have dissipated {amount(best.true_J, 'J')}"
     if taking := [f"{_times(best, other)} {other.label}" for other in others[:2] if other.true_J > 0.0]:
         words += f", {' and '.join(taking)}"
     if others and others[-1].true_J < 0.0:
         words += f"; {others[-1].label} would have fed {amount(-others[-1].true_J, 'J')} into the motion"
-    if noisy := [element.label for element in outcome.elements if element.is_noise]:
-        words += f". Not to be relied on, since much of their force is noise: {', '.join(noisy)}"
-    return f"{words}."
+    return words
 
 
 def _times(best: ElementOutcome, other: ElementOutcome) -> str:
@@ -120,11 +131,7 @@ def note_sentences(outcome: Outcome) -> list[str]:
         _SIZES if len(outcome.elements) > 1 else "",
         _IN_CONTACT if any(element.acts == "in-contact" for element in outcome.scene.dissipation) else "",
         *(_HEAVY.format(label=each.label) for each in outcome.elements if _is_heavy(each)),
-        *(
-            _NOISE.format(share=round(100 * each.fast_share), label=each.label)
-            for each in outcome.elements
-            if each.is_noise
-        ),
+        *_noise(outcome),
     ]
     if force and outcome.elements:
         said = _passivity(outcome)
@@ -136,6 +143,20 @@ def note_sentences(outcome: Outcome) -> list[str]:
             percent, missing = 100.0 * count / notes.rows, amount(notes.missing_s, "s")
             sentences.append(sentence.format(count=count, percent=percent, missing=missing))
     return [sentence for sentence in [*sentences, *notes.remarks] if sentence]
+
+
+def _noise(outcome: Outcome) -> list[str]:
+    moved = [
+        f"{each.label} from {amount(each.true_J, 'J')} to {amount(each.noisier_J, 'J')}"
+        for each in outcome.elements
+        if each.is_moved_by_noise
+    ]
+    fast = [f"{100 * each.fast_share:.0f} % of the force of {each.label}" for each in outcome.elements if each.is_fast]
+    sentences = [
+        _NOISY_POSITIONS.format(noise=amount(outcome.noise_m, "m"), elements=", ".join(moved)) if moved else "",
+        _FAST_FORCE.format(elements=" and ".join(fast)) if fast else "",
+    ]
+    return [*sentences, _LOW_PASS] if moved or fast else []
 
 
 def _is_heavy(element: ElementOutcome) -> bool:
