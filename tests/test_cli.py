@@ -50,6 +50,15 @@ def test_json_is_one_object_on_stdout_and_nothing_else_is(tmp_path):
     assert summary["directory"] == str(tmp_path / "o")
 
 
+def test_the_report_of_a_run_is_on_stdout_with_its_directory_last_and_notes_are_not(tmp_path):
+    out = str(tmp_path / "o")
+    result = haploop("run", FIG6C, "--set", "duration=0.1", "--set", "wall.position=-60", "--in-process", "--out", out)
+    assert "displayed stiffness" in result.stdout or "no-contact" in result.stdout
+    assert result.stdout.splitlines()[-1] == out
+    assert result.stderr.startswith("Note: ")
+    assert result.stderr.count("\n") == 1
+
+
 def test_a_run_leaves_scene_log_and_summary_and_its_scene_runs_by_itself(done, tmp_path):
     assert {path.name for path in done.iterdir()} == {"scene.toml", "log.mcap", "summary.json"}
     again = haploop("run", str(done / "scene.toml"), "--in-process", "--json", "--out", str(tmp_path / "again"))

@@ -251,7 +251,7 @@ def test_the_command_tells_the_force_without_elements_too(tmp_path: Path) -> Non
     assert data["force"]["work_on_device_J"] == pytest.approx(4e-4)
     assert data["force"]["passivity"] == "generated"
     shown = CliRunner().invoke(app, ["dissipate", str(path), "--force", "F", "--damping", "1"], terminal_width=200)
-    words = " ".join(shown.stderr.split())
+    words = " ".join(shown.stdout.split())
     assert "recorded force" in words
     assert "gave out up to 400 µJ more than it had taken: not passive" in words
     assert "In all the recorded force gave 400 µJ to the device" in words

@@ -14,6 +14,7 @@ from rich.console import Console
 from haploop.controller.dissipation import Element, Motion, registry
 from haploop.launch.runs.start import prepare, run
 from haploop.protocol.quantity import Quantity
+from haploop.tools.render.cause import cause
 from haploop.tools.render.progress import ProgressLine
 from haploop.tools.render.report import plugins_table, status_table, summary_table
 from haploop.tools.render.units import amount, fixed
@@ -39,7 +40,8 @@ def test_the_summary_table_holds_every_book_and_the_residual(swap: dict[str, Any
     assert row(text, "unidirectional-inertia (mass 0.01)") == ["1.5–3 s", *books]
     window = swap["window"]
     swing, ripple = (amount(window[key], "N") for key in ("force_swing_N", "force_ripple_N"))
-    assert row(text, "force, peak to peak") == [f"{swing} at its end; {ripple} of it from 30 Hz on"]
+    assert row(text, "force  ") == [f"{swing} peak to peak at its end"]
+    assert f"{ripple} peak to peak: what is faster than 30 Hz alone" in " ".join(text.split())
     assert row(text, "leak by delay") == [amount(energy["wall"]["leak"]["delay_J"], "J")]
     assert row(text, "work of the hand") == [amount(energy["hand_work_J"], "J")]
     assert row(text, "heat in the device") == [amount(energy["device_heat_J"], "J")]
@@ -52,6 +54,37 @@ def test_the_summary_table_begins_with_the_verdict_and_what_was_seen(swap: dict[
     first, second = shown(summary_table(swap), 200).splitlines()[:2]
     assert first.split() == [swap["verdict"], *swap["title"].split()]
     assert swap["verdict_rule"].startswith(second.strip().rstrip("."))
+
+
+@pytest.mark.parametrize(("verdict", "is_told"), [("steady", False), ("limit-cycle", True), ("growing", True)])
+def test_the_likely_cause_is_told_of_what_swings_alone(swap: dict[str, Any], verdict: str, is_told: bool) -> None:
+    text = " ".join(shown(summary_table({**swap, "verdict": verdict})).split())
+    assert (f"Likely cause: {cause(swap['energy'])}" in text) == is_told
+
+
+def energy(*elements: tuple[str, float], **leak: float) -> dict[str, Any]:
+    causes = dict.fromkeys(("delay_J", "sampling_and_hold_J", "quantisation_J"), 0.0) | leak
+    booked = [{"kind": kind, "true_J": true_J} for kind, true_J in elements]
+    return {"elements": booked, "wall": {"leak": {"total_J": sum(causes.values()), **causes}}}
+
+
+@pytest.mark.parametrize(
+    ("books", "told"),
+    [
+        (energy(delay_J=-2e-3, sampling_and_hold_J=-1e-3), "3.00 mJ more than it took, 67 % of it because each force"),
+        (energy(delay_J=1e-3, sampling_and_hold_J=-2e-3), "held for a tick"),
+        (energy(quantisation_J=-1e-6), "100 % of it because the encoder rounds"),
+        (energy(delay_J=-1e-3, sampling_and_hold_J=2e-3), "no more energy than it took"),
+        (energy(), "no more energy than it took"),
+        (energy(("damping", 3e-3), delay_J=-2e-3), "2.00 mJ more than it took"),
+        (energy(("damping", -1e-3), delay_J=-2e-3), "2.00 mJ more than it took"),
+        (energy(("damping", -3e-3), ("inertia", -1e-3), delay_J=-2e-3), "damping gave the device 3.00 mJ, more"),
+        ({"elements": [], "wall": {}}, ""),
+    ],
+)  # fmt: skip
+def test_the_cause_is_what_gave_the_device_most(books: dict[str, Any], told: str) -> None:
+    assert told in cause(books)
+    assert bool(cause(books)) == bool(told)
 
 
 def test_a_scene_without_wall_or_hand_shows_no_wall_and_an_early_end_is_said(tmp_path: Path) -> None:

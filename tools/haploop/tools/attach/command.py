@@ -59,7 +59,7 @@ def attach_logger(run_id: str | Elsewhere | None, out: Path | None) -> None:
         context.destroy(linger=500)
         discard(directory, is_new)  # where nothing was logged
     print_summary(summary)
-    print(directory, file=sys.stderr)
+    print(directory)
     if summary["ended"] == "failed":
         leave(summary["why"], FAILED)
 

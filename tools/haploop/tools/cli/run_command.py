@@ -60,7 +60,7 @@ def run(
     wait: Annotated[str | None, typer.Option("--wait", metavar="TIME", help="how long for [60 s]")] = None,
     json: Json = False,
 ) -> None:
-    """Run a scene to its end. Other terminals can steer and watch it meanwhile."""
+    """Run a scene to its end. Other terminals can steer and watch it meanwhile. The last line names its directory."""
     early = (context.obj or {}).get("early", {})
     with LeavingAtOnce(early):
         from haploop.launch.processes.foreign import ProgramError, check_wait, read_programs
@@ -131,6 +131,6 @@ def run(
             print_json({**summary, "directory": str(prepared.out), "notes": noted})
         else:
             print_summary(summary)
-            print(f"{prepared.out}", file=sys.stderr)
+            print(prepared.out)
         if summary["ended"] == "failed":
             leave(f"The run failed: {summary['why']}.", FAILED)

@@ -22,7 +22,7 @@ _WORDS = {
     "logged_s": ("log ends at", "s"),
     "oscillation_m": ("oscillation at its end", "m"),
     "force_swing_N": ("force, peak to peak", "N"),
-    "force_ripple_N": ("  of it from 30 Hz on", "N"),
+    "force_ripple_N": ("force ripple above 30 Hz", "N"),
     "width_m": ("pushed, it swings by", "m"),
     "frequency_Hz": ("  at", "Hz"),
     "trajectory_sha256": ("trajectory hash", ""),

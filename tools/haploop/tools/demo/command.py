@@ -48,7 +48,7 @@ def demo(
             leave(f"{error}\nWhat was logged is in {directory}.", FAILED)
         except KeyboardInterrupt:
             leave(f"Interrupted; what was logged is in {directory}.", FAILED)
-        console(stderr=True).print(report(story))
+        console().print(report(story))
         try:
             figure = draw(story, directory / FIGURE)
         except FigureError as error:

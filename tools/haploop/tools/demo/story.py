@@ -15,17 +15,9 @@ from haploop.logger.summary import Summary
 from haploop.logger.verdict.measures import WINDOW_S
 from haploop.protocol.scene.scene import ElementTable
 from haploop.tools.figure.data import RunData
+from haploop.tools.render.cause import cause
 from haploop.tools.render.units import amount
 
-# By the cause with the largest share of what the wall gave away.
-BECAUSE = {
-    "delay_J": "each force comes {delay} after the sample it answers, so that the wall still pushes while the device "
-    "moves out",
-    "sampling_and_hold_J": "each force is held for a tick while the device moves on",
-    "quantisation_J": "the encoder rounds the position that the wall answers to",
-}
-NO_LEAK = "Up to {at} the wall gave no more energy than it took: what moves here is not fed by the wall."
-LEAK = "Up to {at} the wall gave the device {energy} more than it took, {share:.0f} % of it because {because}."
 # By whether the loop is steady before and after the swap.
 OUTCOME = {
     (False, True): "With {element} the same wall is steady.",
@@ -91,16 +83,7 @@ class Story:
 
     def why(self) -> str:
         """Returns where the swing before the swap has its energy from, as a sentence."""
-        leak = self.before.summary["energy"]["wall"]["leak"]
-        given = {cause: max(0.0, -leak[cause]) for cause in BECAUSE}
-        at = f"{self.at_s:g} s"
-        if not (total := sum(given.values())) or leak["total_J"] >= 0.0:
-            return NO_LEAK.format(at=at)
-        cause = max(given, key=given.__getitem__)
-        because = BECAUSE[cause].format(delay=f"{1e3 * self.data.scene.clock.round_trip_delay:g} ms")
-        return LEAK.format(
-            at=at, energy=amount(-leak["total_J"], "J"), share=100.0 * given[cause] / total, because=because
-        )
+        return cause(self.before.summary["energy"], f"Up to {self.at_s:g} s")
 
     def outcome(self) -> str:
         """Returns what the swap did, as a sentence."""

@@ -104,7 +104,7 @@ def dissipate(request: Request, as_json: bool) -> None:
         print_json(outcome.as_data() | {"figure": str(figure) if figure else None})
         return
 
-    console(stderr=True).print(make_report(outcome))
+    console().print(make_report(outcome))
     if figure:
         print(figure)
 

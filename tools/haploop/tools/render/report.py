@@ -6,6 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from haploop.launch.processes.foreign import described
+from haploop.tools.render.cause import SWINGS, cause
 from haploop.tools.render.terminal import console, make_facts, make_table, seen, told, verdict_style
 from haploop.tools.render.units import amount, fixed, parameters, spring
 
@@ -23,6 +24,11 @@ if TYPE_CHECKING:
 
 _ITS_WORD = "That the {} does what the scene says is its own word; haploop replay holds it against the scene."
 _TRIED = "this hold, pushed by up to {}; haploop advise tries taps, other holds and devices"
+# Entries of the summary's window, their words, and what stands after the number. Peaks of two swings do not add.
+_OF_FORCE = {
+    "force_swing_N": ("force", " peak to peak at its end"),
+    "force_ripple_N": ("force ripple", " peak to peak: what is faster than 30 Hz alone, no share of the force"),
+}
 # Entry of the summary, the count in it, and its words.
 _COUNTS = (
     ("lost", "commands_dropped", "commands dropped"),
@@ -53,7 +59,7 @@ def count_losses(summary: Summary) -> dict[str, int]:
 
 
 def print_summary(summary: Summary) -> None:
-    console(stderr=True).print(summary_table(summary))
+    console().print(summary_table(summary))
 
 
 def summary_table(summary: Summary) -> RenderableType:
@@ -67,6 +73,8 @@ def summary_table(summary: Summary) -> RenderableType:
     rule = summary["verdict_rule"] if "stability" in summary else summary["verdict_rule"].partition("; ")[0]
     rule = rule.rstrip(".")
     parts: list[RenderableType] = [head, Text(f"{rule[:1].upper()}{rule[1:]}.", style="dim")]
+    if summary["verdict"] in SWINGS and (why := cause(summary["energy"])):
+        parts.append(Text(f"Likely cause: {why}"))
     if summary["ended"] not in ("done", "diverged"):
         parts.append(Text(f"ended early: {summary['ended']}", style="bold red"))
     told_too = [*summary.get("not_made", ()), *filter(None, [summary["energy"].get("balance")])]
@@ -87,10 +95,9 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
         *_programs(summary),
         ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak at its end"),
     ]
-    if (ripple_N := window.get("force_ripple_N")) is not None:
-        whole = window.get("force_swing_N")
-        both = f"{amount(whole, 'N')} at its end; " if whole is not None else ""
-        figures.append(("force, peak to peak", f"{both}{amount(ripple_N, 'N')} of it from 30 Hz on"))
+    for key, (words, after) in _OF_FORCE.items():
+        if (force_N := window.get(key)) is not None:
+            figures.append((words, amount(force_N, "N") + after))
     found = summary.get("stability", {})
     figures += _stability(found)
     if summary["verdict"] == "steady" and "push_N" in found:
@@ -181,7 +188,7 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     if not rests(found):
         watched = f"watched for {found['watched_s']:g} s"
         rows += [
-            ("its force from 30 Hz on", f"{amount(found['force_ripple_N'], 'N')} peak to peak"),
+            ("its force ripples by", f"{amount(found['force_ripple_N'], 'N')} peak to peak above 30 Hz"),
             ("growth", f"{found['rate_1_s']:.3g} +- {found['error_1_s']:.2g} 1/s, {watched}"),
         ]
     if (share := found.get("own_share")) is not None:

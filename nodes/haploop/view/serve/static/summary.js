@@ -33,7 +33,7 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
     "pushed, it swings":
       found.width_m < 1e-9 ? "less than 1 nm" : `${amount(found.width_m, "m")} ± ${amount(found.spread_m, "m", 2)}`,
     "that is": [...how, found.chaotic && "chaotic"].filter(Boolean).join(", "),
-    "its force from 30 Hz on": amount(found.force_ripple_N, "N"),
+    "its force ripples by": `${amount(found.force_ripple_N, "N")} above 30 Hz`,
     growth: `${fixed(rate)} ± ${fixed(error, 2)} 1/s`,
     ...(found.blown ? { [`after a blow of ${amount(found.blow_N, "N")}`]: found.blown } : {}),
     ...(isNumber(found.own_share) ? { "its own in the run's swing": share(found.own_share) } : {}),

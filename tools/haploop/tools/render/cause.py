@@ -1,0 +1,35 @@
+"""Likely cause of a swing, as a sentence: what gave the device the most energy, by the books of a run."""
+
+from __future__ import annotations
+
+from haploop.logger.summary import Summary
+from haploop.tools.render.units import amount
+
+# Verdicts of a loop that swings.
+SWINGS = ("limit-cycle", "growing", "diverged")
+# By the cause with the largest share of what the wall gave away.
+_BECAUSE = {
+    "delay_J": "each force comes after a delay, so that the wall still pushes while the device moves out",
+    "sampling_and_hold_J": "each force is held for a tick while the device moves on",
+    "quantisation_J": "the encoder rounds the position that the wall answers to",
+}
+_NONE = "{when} the wall gave no more energy than it took: what moves here is not fed by the wall."
+_WALL = "{when} the wall gave the device {energy} more than it took, {share:.0f} % of it because {because}."
+_ELEMENT = "{when} {element} gave the device {energy}, more than the wall did."
+
+
+def cause(energy: Summary, when: str = "In all") -> str:
+    """Returns where a swing has its energy from, given a summary's ``energy``; nothing of books without a wall."""
+    if "leak" not in energy["wall"] or energy["wall"]["leak"]["total_J"] is None:
+        return ""
+    leak = energy["wall"]["leak"]
+    given = {cause: max(0.0, -leak[cause]) for cause in _BECAUSE}
+    fed = [(-element["true_J"], element["kind"]) for element in energy["elements"] if element["true_J"]]
+    most_J, element = max(fed, default=(0.0, ""))
+    if most_J > max(0.0, -leak["total_J"]):
+        return _ELEMENT.format(when=when, element=element, energy=amount(most_J, "J"))
+    if leak["total_J"] >= 0.0 or not (total := sum(given.values())):
+        return _NONE.format(when=when)
+    most = max(given, key=given.__getitem__)
+    share = 100.0 * given[most] / total
+    return _WALL.format(when=when, energy=amount(-leak["total_J"], "J"), share=share, because=_BECAUSE[most])
