@@ -106,6 +106,21 @@ def test_a_new_scene_of_every_device_and_hand_can_be_run_and_asks_for_the_wall_i
     assert (scene.wall.stiffness, scene.hand.force) == (250.0, Ramp(value=-1.0, rise_time=0.3))
 
 
+def test_a_new_scene_takes_a_device_and_a_hand_of_ones_own_wherever_they_are():
+    Path("mine").mkdir()
+    Path("mine/device.toml").write_text("[device]\nmass = 0.123\ndamping = 0.5\n")
+    Path("hand.toml").write_text("[hand]\nmass = 0.2\n")
+    made = call("new", "mine/scene.toml", "--device", "mine/device.toml", "--hand", "hand.toml")
+    assert made.exit_code == 0, made.output
+    assert 'extends = ["device.toml", "../hand.toml"]' in Path("mine/scene.toml").read_text()
+    scene = load("mine/scene.toml")
+    assert scene.hand
+    assert (scene.device.mass, scene.hand.mass) == (0.123, 0.2)
+    refused = call("new", "other.toml", "--device", "nowhere.toml")
+    assert refused.exit_code == 2
+    assert "'nowhere.toml' is no file, and none of that name comes with haploop" in refused.stderr
+
+
 def test_what_its_comments_offer_can_be_run_too():
     call("new", "my.toml")
     text = Path("my.toml").read_text()

@@ -26,6 +26,8 @@ CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"clock": {"round_trip_delay": 1.0}}, {"clock": {"round_trip_delay": 0.9}}, "No force takes effect"),
     ({"hand": {"mass": 0.1, "stiffness": 50.0}}, {"hand": {"mass": 0.1, "stiffness": 50.0, "rest": 0.01}},
      "Nothing moves the device"),
+    ({"hand": PUSHED, "friction": {"kinetic": 80.0}}, {"hand": PUSHED, "friction": {"kinetic": 8.0}},
+     "Dry friction of 80 N holds the device, which the hand pushes by 10 N at most"),
     ({"hand": PUSHED, "wall": {"position": -60, "stiffness": 150}},
      {"hand": PUSHED, "wall": {"position": -0.06, "stiffness": 150}}, "The wall is at -60 m"),
     ({"hand": PUSHED | {"stiffness": 2000.0, "damping": 9.0}, "wall": WALL}, {"hand": PUSHED, "wall": WALL},
@@ -107,6 +109,25 @@ def test_check_notes_what_cannot_be_meant_and_does_not_refuse_it():
     assert json.loads(CliRunner().invoke(app, ["check", fig, "--json"]).stdout)["notes"] == []
 
 
+def test_the_last_line_of_check_is_its_verdict_and_the_notes_stand_before_it():
+    fig = str(SCENES / "fig6c.toml")
+    told = CliRunner().invoke(app, ["check", fig, "--set", "wall.position=-60"]).output.splitlines()
+    assert told[-2].startswith("Note: The wall is at -60 m")
+    assert told[-1] == f"{fig} can be run. But see above what it can hardly mean."
+    assert CliRunner().invoke(app, ["check", fig]).output.splitlines()[-1] == f"{fig} can be run."
+
+
+def test_a_change_of_a_wall_that_is_not_there_and_an_element_of_ones_own_are_told_what_is_missing():
+    change = [{"at": 0.5, "set": {"wall.stiffness": 100.0}}]
+    with pytest.raises(SceneError, match=r"wall\.stiffness cannot be set\. The scene has no \[wall\]\. Allowed at"):
+        scene(event=change)
+    with pytest.raises(SceneError, match=r"wall\.stifness cannot be set; did you mean wall.stiffness\? Allowed at"):
+        scene(event=[{"at": 0.5, "set": {"wall.stifness": 100.0}}], wall=WALL)
+    for tables in ({"dissipation": [{"kind": "brake"}]}, {"event": [{"at": 0.5, "swap": {"kind": "brake"}}]}):
+        with pytest.raises(SceneError, match="An element of yours comes with --plugin FILE"):
+            scene(**tables)
+
+
 REPAIRS = {
     "duration = 0.0003": "the least legal value is 0.001 s",
     "duration = 1,5": "A decimal has a point and no comma: 1.5.",
@@ -125,6 +146,8 @@ def test_a_mistake_of_form_is_told_with_its_repair(tmp_path, head, words):
         load(file)
 
 
-def test_notes_come_after_the_scene():
-    told = CliRunner().invoke(app, ["check", str(SCENES / "fig6c.toml"), "--set", "wall.position=-60"])
-    assert told.output.strip().splitlines()[-1].startswith("Note: The wall is at -60 m")
+@pytest.mark.parametrize(("friction_N", "moves"), [(9.9, True), (10.0, False)])
+def test_a_device_that_friction_is_said_to_hold_stays_where_it_is(tmp_path, friction_N, moves):
+    tables: dict[str, Any] = {"hand": PUSHED | {"stiffness": 0.0}, "friction": {"kinetic": friction_N}}
+    assert any(note.startswith("Dry friction") for note in note_unmeant(scene(**tables))) == (not moves)
+    assert (farthest_m(tmp_path, **tables) > 0.0) == moves

@@ -103,6 +103,17 @@ def _pushed_away(scene: Scene) -> Found | None:
     return {"force_N": value_N} if away else None
 
 
+def _held_by_friction(scene: Scene) -> Found | None:
+    """Compares dry friction with the most that hand and spring push a device by that is at rest outside the wall."""
+    hand, rubs, begin = scene.hand, scene.friction, scene.device.position
+    is_pushed = scene.others or scene.device.velocity or _start_depth_m(scene) > 0.0 or _wall_moves(scene)
+    if hand is None or rubs is None or hand_is_unmodelled(scene) or is_pushed:
+        return None
+    push_N = _most_force_N(scene) + hand.stiffness * abs(hand.rest - begin)
+    friction_N = max(rubs.kinetic, rubs.breakaway or 0.0)
+    return {"friction_N": friction_N, "push_N": push_N} if 0.0 < push_N <= friction_N else None
+
+
 def _beyond_the_end(scene: Scene) -> Found | None:
     wall, most = scene.wall, scene.diverged_beyond
     if wall is None or _start_depth_m(scene) > 0.0 or abs(wall.position) < most or _wall_moves(scene):
@@ -141,6 +152,11 @@ RULES = (
         _pushed_by_nothing,
         "Nothing moves the device: the hand has no force and no stretched spring, the device no velocity at the start, "
         "and it begins outside the wall. [hand.force] would push it, device.velocity throw it.",
+    ),
+    Rule(
+        _held_by_friction,
+        "Dry friction of {friction_N:.3g} N holds the device, which the hand pushes by {push_N:.3g} N at most: it "
+        "hardly moves. Is that the unit that was meant?",
     ),
     Rule(
         _beyond_the_end,

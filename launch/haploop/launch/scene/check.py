@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 # Where the key ``kind`` says what else is in a table; a number stands for any.
 _TAGGED = {("hand", "force"), ("jitter",), ("dissipation", 0), ("event", 0, "swap")}
+_OWN_KIND = " An element of yours comes with --plugin FILE."
 _FORMS = {
     "bool_type": "It must be true or false.",
     "string_type": "It must be text in quotes.",
@@ -165,7 +166,8 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
         case "union_tag_invalid" | "literal_error":
             key = (*key, "kind") if what == "union_tag_invalid" else key
             allowed = alternatives(schema, rule)
-            layers.complain(key, f"Allowed: {', '.join(allowed)}.", None, nearest(layers.value(key), allowed))
+            own = _OWN_KIND if "dissipation" in key or "swap" in key else ""
+            layers.complain(key, f"Allowed: {', '.join(allowed)}.{own}", None, nearest(layers.value(key), allowed))
             if what == "union_tag_invalid":
                 _complain_of_keys(layers, key[:-1], schema, rule)
         case "sentence":

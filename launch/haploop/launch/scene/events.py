@@ -117,7 +117,8 @@ def _setting(
             "is a table",
         )
     elif name not in settable:
-        expected = f"Allowed at that time: {', '.join(settable)}."
+        no_wall = name.startswith("wall.") and "wall.position" not in settable
+        expected = f"{'The scene has no [wall]. ' * no_wall}Allowed at that time: {', '.join(settable)}."
         layers.complain(key, expected, "cannot be set", _nearest_key(name, settable))
     else:
         try:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.toml_writer import inline
 from haploop.protocol.names import nearest
@@ -39,25 +42,33 @@ stiffness = {wall}
 
 
 class FirstSceneError(ValueError):
-    """A device or hand that does not come with haploop; the message says which do."""
+    """A device or hand that is no file and does not come with haploop; the message says which do."""
 
 
-def first_scene(device: str, hand: str, wall: str) -> str:
+def first_scene(device: str, hand: str, wall: str, folder: Path) -> str:
     """Returns a scene in which a hand moves a device into a wall and holds it there.
 
     Args:
-        device, hand: names that ``haploop scenes`` lists.
+        device, hand: names that ``haploop scenes`` lists, or paths of files of one's own.
         wall: stiffness with its unit, not checked.
+        folder: where the scene will be; files of one's own are named from there.
     """
-    for option, name, folder in (("--device", device, "devices"), ("--hand", hand, "hands")):
-        known = bundled(folder)
-        if name not in known:
-            meant = nearest(name, known)
-            hint = f"; did you mean {meant}?" if meant else "."
-            raise FirstSceneError(f"{option} {name!r} does not come with haploop{hint} These do: {', '.join(known)}.")
     return _TEXT.format(
-        title=inline(f"{device} held by {hand} against a wall of {wall}"),
-        device=inline(f"devices/{device}.toml"),
-        hand=inline(f"hands/{hand}.toml"),
+        title=inline(f"{Path(device).stem} held by {Path(hand).stem} against a wall of {wall}"),
+        device=inline(_source("--device", device, "devices", folder)),
+        hand=inline(_source("--hand", hand, "hands", folder)),
         wall=inline(wall),
+    )
+
+
+def _source(option: str, name: str, kind: str, folder: Path) -> str:
+    known = bundled(kind)
+    if name in known:
+        return f"{kind}/{name}.toml"
+    if Path(name).is_file():
+        return Path(os.path.relpath(name, folder)).as_posix()
+    meant = nearest(name, known)
+    hint = f"; did you mean {meant}?" if meant else "."
+    raise FirstSceneError(
+        f"{option} {name!r} is no file, and none of that name comes with haploop{hint} These do: {', '.join(known)}."
     )

@@ -26,8 +26,10 @@ def scenes(json: Json = False) -> None:
 
 def new(
     file: Annotated[Path, typer.Argument(help="scene file to write, not there yet", show_default=False)],
-    device: Annotated[str, typer.Option(metavar="NAME", help="a device that haploop scenes lists")] = "premium15",
-    hand: Annotated[str, typer.Option(metavar="NAME", help="a hand that haploop scenes lists")] = "fu_cavusoglu_y",
+    device: Annotated[
+        str, typer.Option(metavar="NAME", help="that haploop scenes lists, or a file of yours")
+    ] = "premium15",
+    hand: Annotated[str, typer.Option(metavar="NAME", help="likewise")] = "fu_cavusoglu_y",
     wall: Annotated[str, typer.Option(metavar="STIFFNESS", help="stiffness of the wall")] = "0.5 N/mm",
 ) -> None:
     """Write a commented scene to start from. A hand moves a device into a wall and holds it there."""
@@ -37,7 +39,7 @@ def new(
 
     with plain_errors():
         try:
-            text = first_scene(device, hand, wall)
+            text = first_scene(device, hand, wall, file.parent)
             with file.open("x", encoding="utf-8") as new_file:
                 new_file.write(text)
         except FirstSceneError as error:

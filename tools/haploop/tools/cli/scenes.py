@@ -65,8 +65,8 @@ def check(
         print(to_toml(tables), end="", flush=True)
         with_a = " with a plant of yours (--node plant=COMMAND)" if hand_is_unmodelled(resolved) else ""
         no_wall = "" if resolved.wall else " It has no [wall]: nothing pushes the device back."
-        print(f"{scene} can be run{with_a}.{no_wall}", file=sys.stderr)
-        print_notes(resolved, kinds)
+        noted = " But see above what it can hardly mean." if print_notes(resolved, kinds) else ""
+        print(f"{scene} can be run{with_a}.{no_wall}{noted}", file=sys.stderr)
 
 
 def plugins(plugin: Plugin = None, json: Json = False) -> None:
