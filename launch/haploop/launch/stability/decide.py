@@ -33,14 +33,17 @@ _TELLING_PERIODS = 7.0
 _LONGEST_S = 3600.0
 # A command that ripples by less is constant, but for rounding.
 _STILL_N = 1e-9
+# A command whose ripple is more than this share of the push, a tenth of the hold, is told of beside the word.
+_RIPPLES = 0.33
+HAND_MOVES = "the hand's motion"
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
 _COUNTS = 10
 
 WHY = {
     "diverged": "The run ended by itself: {detail}.",
     "no contact": "No tick of the last half second, or of the second half of a shorter run, was in contact.",
-    "rest": "After a push of {push_N:.3g} N it came to rest.",
-    "unfelt": "After a push of {push_N:.3g} N it came to rest but for {width_um:.3g} µm peak to peak, most at "
+    "rest": "After a push of {push_N:.3g} N it came to rest, to 5 % within {settles_s:.2g} s.",
+    "unfelt": "After a push of {push_N:.3g} N it came to rest within {settles_s:.2g} s but for {width_um:.3g} µm peak to peak, most at "
     "{frequency_Hz:.3g} Hz: less than a hand feels.",
     "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width_mm:.3g} mm peak to peak at "
     "{frequency_Hz:.3g} Hz.",
@@ -53,17 +56,27 @@ WHY = {
     "failed": "The loop failed while it was watched: {detail}",
     "rested": "After a push of {push_N:.3g} N it came to rest.",
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
+    "rests off the wall": "After a push of {push_N:.3g} N it came to rest off the wall.",
+    "too few": "It still moves, by {width_mm:.3g} mm peak to peak in half of {watched_s:g} s: too slowly to tell what "
+    "becomes of it; {run} might tell.",
     "too slow": "Of its swings of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz the steadier changes by "
     "{rate_1_s:.2g} +- {error_1_s:.2g} 1/s, too slowly, or too unlike the other, to tell within {watched_s:g} s; "
     "{run} might tell.",
 }
-# What is said beside that after a blow, and how the words for its finding are told.
+# What is said beside that after a blow, and of the loop without its friction.
 AFTER_BLOW = {
     "rests": " It did after blows of {blow_N:.3g} N for 0.05 s, into the wall and off it, too.",
+    "rests off the wall": " It did after blows of {blow_N:.3g} N for 0.05 s, into the wall and off it, too, there "
+    "where the blow had left it: the hand does not bring it back.",
     "swings on": " After a harder blow, of {blow_N:.3g} N, it swings on: either may come of how it is touched.",
     "undecided": " Whether it does after a harder blow, of {blow_N:.3g} N, could not be told.",
 }
-_BLOWN = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on"}
+FRICTIONLESS = {
+    "rests": " It would without its friction, too.",
+    "swings on": " Only friction holds it: without, its swing would last or grow, as one may that is wide enough.",
+    "undecided": " Whether it would without its friction could not be told.",
+}
+_DOES = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on", "diverged": "swings on"}
 
 
 @dataclass(frozen=True)
@@ -87,7 +100,10 @@ class Finding:
         most_1_s: what either swing may grow or decay by: its rate and two standard errors, of the one that may change
             most; None where it was not watched to an answer.
         blow_N: of a loop that rests after the push, a harder one, into the wall and off it; None if not asked.
-        blown: what it does after these: rests, swings on, or undecided.
+        blown: what it does after these: rests, rests off the wall, swings on, or undecided.
+        frictionless: what a loop that rests, too, after these would do after the push without its friction: rests,
+            swings on, or undecided; None if not asked, and of a loop without.
+        settles_s: how long after the push it came within 5 % of where it rests; None of one that does not.
     """
 
     word: str
@@ -106,25 +122,50 @@ class Finding:
     most_1_s: float | None = None
     blow_N: float | None = None
     blown: str | None = None
+    frictionless: str | None = None
+    settles_s: float | None = None
     detail: str = ""
+
+    @property
+    def tells(self) -> bool:
+        """Tells whether watching for longer would show nothing else."""
+        return self.word != "undecided" or self.why == "rests off the wall"
 
     def after_blow(self, found: Finding) -> Finding:
         """Returns the finding with what was found after a harder push: undecided unless it rests then, too."""
-        struck = replace(self, blow_N=found.push_N, blown=_BLOWN.get(found.word, "undecided"))
-        return struck if struck.blown == "rests" else replace(struck, word="undecided", why="rested")
+        blown = found.why if found.why == "rests off the wall" else _DOES.get(found.word, "undecided")
+        struck = replace(self, blow_N=found.push_N, blown=blown)
+        return struck if blown.startswith("rests") else replace(struck, word="undecided", why="rested")
 
-    def entries(self, seen_m: float | None = None, beside: Sequence[str] = ()) -> dict[str, Any]:
+    def without_friction(self, found: Finding) -> Finding:
+        """Returns the finding with what was found after the same push of the loop without its friction."""
+        return replace(self, frictionless=_DOES.get(found.word, "undecided"))
+
+    def entries(
+        self, seen_m: float | None = None, beside: Sequence[str] = (), ripple_N: float | None = None
+    ) -> dict[str, Any]:
         """Returns what a summary tells of it: the word, why as a sentence, and the numbers as its ``stability``.
 
         Args:
             seen_m: how far the run itself swung at its end, peak to peak.
             beside: what else moved the run there, see ``moved_beside``.
+            ripple_N: what its command swung by above 30 Hz there, peak to peak.
         """
         numbers = {name: value for name, value in vars(self).items() if name not in ("word", "detail")}
         # A swing that nothing else moves is the loop's own, and differs from the one after a push by chance alone.
         is_told = beside or self.word == "steady"
         numbers |= {"own_share": self.own_share(seen_m) if is_told else None, "moved_beside": [*beside]}
+        numbers["provisos"] = self._provisos(beside, ripple_N)
         return {"verdict": self.word, "verdict_rule": self.sentence(), "stability": numbers}
+
+    def _provisos(self, beside: Sequence[str], ripple_N: float | None) -> list[str]:
+        """Returns what has to be said in the same breath as ``steady``."""
+        holds = {
+            "only friction holds it": self.frictionless == "swings on",
+            "at its last hold": HAND_MOVES in beside,
+            "its force ripples": (ripple_N or 0.0) > _RIPPLES * self.push_N,
+        }
+        return [proviso for proviso, holds_it in holds.items() if holds_it and self.word == "steady"]
 
     def own_share(self, seen_m: float | None) -> float | None:
         """Returns which share of the swing seen in the run the loop keeps up by itself, with a still hand and no noise.
@@ -144,7 +185,8 @@ class Finding:
         about_s = float(f"{numbers['needs_s']:.2g}")
         run = f"some {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
         sentence = WHY[self.why].format(**numbers, **sizes, run=run)
-        return sentence + (AFTER_BLOW[self.blown].format(**numbers) if self.blown else "")
+        sentence += AFTER_BLOW[self.blown].format(**numbers) if self.blown else ""
+        return sentence + (FRICTIONLESS[self.frictionless] if self.frictionless else "")
 
 
 def decide(swing: Swing, *, last: bool) -> Finding:
@@ -155,7 +197,8 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     felt. *growing*: both swings grow. Of swings of fewer than six periods nothing is said.
     """
     if not swing.inside:
-        return Finding("undecided", "leaves the wall", swing.push_N, swing.watched_s)
+        why = "rests off the wall" if swing.moved_m < REST_M else "leaves the wall"
+        return Finding("undecided", why, swing.push_N, swing.watched_s)
     if swing.most_m < REST_M and swing.moved_m < _SMALL_M:
         return _finding(swing, "steady", "rest")
     is_long, changes = swing.watched_s >= _LONG_S, [*zip(swing.changes, swing.errors, strict=True)]
@@ -172,7 +215,8 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     if unfelt and seen and not (rising or goes_on or settles):
         return _finding(swing, "steady", "unfelt" if swing.width_m >= REST_M else "rest")
     if not swing.covers:
-        return _finding(swing, "undecided", "too slow")
+        found = _finding(swing, "undecided", "too few")
+        return replace(found, width_m=swing.moved_m, frequency_Hz=0.0, rate_1_s=None, error_1_s=None)
     if forgets:
         return _finding(swing, "limit-cycle", "forgets")
     kept_ratio = swing.at_first > 2.0 and SAME[0] < swing.at_last / swing.at_first < SAME[1]
@@ -209,4 +253,5 @@ def _finding(swing: Swing, word: str, why: str) -> Finding:
     return Finding(
         word, why, swing.push_N, swing.watched_s, swing.rate_1_s, swing.error_1_s, frequency_Hz, swing.width_m,
         swing.spread_m, ripple_N, swing.times_felt >= 1.0 or swing.width_m >= felt_m, None, needs_s, most_1_s,
+        settles_s=swing.settles_s if why in ("rest", "unfelt") else None,
     )  # fmt: skip

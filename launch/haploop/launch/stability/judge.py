@@ -15,6 +15,7 @@ from haploop.launch.stability.decide import Finding
 from haploop.launch.stability.looks import (
     BESIDE,
     BLOWS,
+    LOOKS_S,
     PATIENT_S,
     SMALLER,
     failed,
@@ -30,6 +31,7 @@ from haploop.launch.stability.still_hand import End, StillHand, hold_of
 from haploop.logger.summary import Summary, finite, write_summary
 from haploop.plant.plant import Plant
 from haploop.protocol.changes import Event, is_change
+from haploop.protocol.scene.effects import Friction
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
@@ -39,6 +41,8 @@ def judge_scene(
     kinds: Mapping[str, type[Element]],
     events: Sequence[tuple[int, Event]] | None = None,
     looks_s: Sequence[float] = PATIENT_S,
+    *,
+    frictionless: bool = False,
 ) -> Finding:
     """Runs a resolved scene to its end and judges that end.
 
@@ -47,13 +51,14 @@ def judge_scene(
         kinds: element kinds at hand.
         events: (tick, event) in order; the scene's own when None.
         looks_s: times since the push at which the loop is looked at until it tells.
+        frictionless: whether one that rests is pushed without its friction, too.
 
     Raises:
         ElementError: an element raised.
         ArithmeticError: the plant's arithmetic failed.
     """
     end = end_of(scene, kinds, events)
-    return judge(end, looks_s) if isinstance(end, End) else end
+    return judge(end, looks_s, frictionless=frictionless) if isinstance(end, End) else end
 
 
 def end_of(
@@ -115,24 +120,26 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
         finding = Finding("diverged", "diverged", detail=summary["why"])
     else:
         return summary
-    summary = finite(
-        summary | finding.entries(summary["window"]["oscillation_m"], moved_beside(scene, summary["window"]["from_s"]))
-    )
+    window = summary["window"]
+    beside = moved_beside(scene, window["from_s"])
+    summary = finite(summary | finding.entries(window["oscillation_m"], beside, window.get("force_ripple_N")))
     if out:
         write_summary(summary, out)
     return summary
 
 
-def judge(end: End, looks_s: Sequence[float] = PATIENT_S) -> Finding:
+def judge(end: End, looks_s: Sequence[float] = PATIENT_S, *, frictionless: bool = False) -> Finding:
     """Returns whether a loop forgets its start, from the end of a run in contact on.
 
     The hand is held still with the mean force of its last contacts, noise is switched off, and two copies of the loop
     are pushed, one ten times as hard as the other. Whatever moves a second later is the loop's own. Most loops tell
     within a second or two; slow ones are watched to the last look. It takes as long as simulating that time twice. One
-    that comes to rest is struck, too, into the wall and off it, which takes as long again.
+    that comes to rest is struck, too, into the wall and off it, which takes as long again. Friction stops small swings of
+    an unstable loop, but wide ones not: where somebody asks, what rests is pushed without its friction as well.
     """
     push_N = push_of(end.hold_N)
-    found, x = _watched(end, (push_N * SMALLER, push_N), looks_s)
+    pushes_N = push_N * SMALLER, push_N
+    found, x = _watched(end, pushes_N, looks_s)
     if found.word == "limit-cycle":
         beside = StillHand(end, push_N * (1.0 + BESIDE))
         beside.go_to(found.watched_s)
@@ -140,6 +147,9 @@ def judge(end: End, looks_s: Sequence[float] = PATIENT_S) -> Finding:
     for blow in BLOWS:
         if is_struck(found):
             found = found.after_blow(_watched(end, (push_N * blow,), looks_s)[0])
+    if frictionless and is_struck(found) and end.scene.friction:
+        free = replace(end, scene=replace(end.scene, friction=Friction(kinetic=0.0)))
+        found = found.without_friction(_watched(free, pushes_N, LOOKS_S)[0])
     return found
 
 
@@ -163,6 +173,6 @@ def _watched(end: End, pushes_N: tuple[float, ...], looks_s: Sequence[float]) ->
             break
         pushed = [each[None] for each in (copies[0].x, copies[-1].x, copies[-1].command)]
         [found] = findings(pushed, end.time, wall, [end.scene], np.array([push_N]), last=seconds == times_s[-1])
-        if found.word != "undecided":
+        if found.tells:
             break
     return found, copies[-1].x

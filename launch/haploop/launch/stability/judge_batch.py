@@ -77,7 +77,7 @@ def _watched(
     for seconds in times_s:
         for copy, x in copies.go_to(seconds):
             place = copy % count
-            if found[place].word == "undecided":
+            if not found[place].tells:
                 found[place] = left_limit(push_N[place], seconds, _wall_of(end, members[place]), x)
         _keep(copies, found, count)
         here = copies.copy[: len(copies.copy) // len(shares)]
@@ -97,7 +97,7 @@ def _watched(
 
 
 def _keep(copies: StillBatch, found: list[Finding], count: int) -> None:
-    copies.keep(np.array([found[copy % count].word == "undecided" for copy in copies.copy], bool))
+    copies.keep(np.array([not found[copy % count].tells for copy in copies.copy], bool))
 
 
 def _with_chaos(

@@ -23,6 +23,8 @@ _PHASE, _UNSURE = 6.0, (1e-4, 1.0)
 REST_M = 1e-9
 # A slow swing within this many counts of the encoder, or this wide, is no motion that could make a fast one.
 _CREEP, _CREEP_M = 3.0, 20e-6
+# A swing has settled that is no larger than this share of its way.
+_SETTLED = 0.05
 # Sizes whose ratio lies between these are the same; those of the pushes differ by ten.
 SAME = (0.7, 1.43)
 
@@ -63,6 +65,7 @@ class Swing(NamedTuple):
         frequency_Hz: of the end.
         covers: whether a piece covers periods enough to tell how the swing changes, or its turns tell.
         times_felt: how strong the last quarter of either is, in terms of what is felt.
+        settles_s: time after the larger push from which on it stays within 5 % of its way, or within what remains.
     """
 
     watched_s: float
@@ -85,6 +88,7 @@ class Swing(NamedTuple):
     ripple_N: float
     covers: bool
     times_felt: float
+    settles_s: float
 
     def lasts(self, within: float) -> bool:
         """Tells whether both swings neither grow nor decay, as far as their scatter lets one say."""
@@ -160,8 +164,18 @@ def _measured(
         ripple(command[:, last_quarter], rate),
         covers >= _LEAST_PERIODS,
         times_felt,
+        _settling_s(large_x, rate),
     ]
     return zip(*(column.tolist() for column in columns), strict=True)
+
+
+def _settling_s(x: np.ndarray, rate: float) -> np.ndarray:
+    """Returns the times from which on x, shape (loops, ticks), stays within 5 % of its way, or within what remains."""
+    quarter = x[:, -x.shape[1] // 4 :]
+    apart = np.abs(x - quarter.mean(axis=1, keepdims=True))
+    within = np.maximum(_SETTLED * apart.max(axis=1), np.maximum(np.ptp(quarter, axis=1), REST_M))
+    outside = apart > within[:, None]
+    return np.where(outside.any(axis=1), x.shape[1] - np.argmax(outside[:, ::-1], axis=1), 1) / rate
 
 
 def _by_turns(swing: Swing, small_x: np.ndarray, large_x: np.ndarray, rate: float) -> Swing:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from haploop.protocol.transport.wire import Message
 
 _ITS_WORD = "That the {} does what the scene says is its own word; haploop replay holds it against the scene."
-_TRIED = "this hold, pushed by up to {}; haploop advise tries taps, other holds and devices"
+_TRIED = "a hold of {}, pushed by up to {}; haploop advise tries taps, other holds and devices"
 # Entries of the summary's window, their words, and what stands after the number. Peaks of two swings do not add.
 _OF_FORCE = {
     "force_swing_N": ("force", " peak to peak at its end"),
@@ -68,7 +68,8 @@ def summary_table(summary: Summary) -> RenderableType:
     from rich.text import Text
 
     word = told(summary)
-    head = Text.assemble((word, verdict_style(word)), "  ", (summary["title"], "bold"))
+    provisos = "".join(f", {proviso}" for proviso in summary.get("stability", {}).get("provisos", ()))
+    head = Text.assemble((word, verdict_style(word)), (provisos, "bold yellow"), "  ", (summary["title"], "bold"))
     # Of the rule of a window the measures alone, without the limits they were held against.
     rule = summary["verdict_rule"] if "stability" in summary else summary["verdict_rule"].partition("; ")[0]
     rule = rule.rstrip(".")
@@ -101,7 +102,10 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     found = summary.get("stability", {})
     figures += _stability(found)
     if summary["verdict"] == "steady" and "push_N" in found:
-        figures.append(("tried", _TRIED.format(amount(found["blow_N"] or found["push_N"], "N"))))
+        from haploop.launch.stability.looks import PUSH
+
+        hold_N, most_N = found["push_N"] / PUSH, found["blow_N"] or found["push_N"]
+        figures.append(("tried", _TRIED.format(amount(hold_N, "N"), amount(most_N, "N"))))
     if window["penetration_mean_m"] is not None:
         depth = f"{amount(window['penetration_mean_m'], 'm')} on average"
         outside = 100 * window["outside_fraction"]
@@ -195,8 +199,12 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
         beside = found.get("moved_beside", ("the hand's motion", "noise"))
         own = f"{100 * share:.0f} %" if share >= 0.01 else "less than 1 %"
         rows.append(("of the oscillation", f"{own} its own; else {' or '.join([*beside, 'dying away'])}"))
+    if (settles_s := found.get("settles_s")) is not None:
+        rows.append(("settles within", f"{amount(settles_s, 's')}, to 5 %"))
     if blown := found.get("blown"):
         rows.append(("after a blow", f"of {amount(found['blow_N'], 'N')}: {blown}"))
+    if frictionless := found.get("frictionless"):
+        rows.append(("without its friction", frictionless))
     return rows
 
 

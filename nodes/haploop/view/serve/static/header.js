@@ -50,9 +50,12 @@ function showVerdict(state) {
   sought.dataset.verdict = known;
   sought.dataset.is = isJudged(state) ? "judged" : (is ?? "seen");
   sought.title = (isJudged(state) ? state.verdict_rule : sight?.why) ?? "";
-  put(byId("seen"), isJudged(state) ? moved(state) : is in NOT_YET ? "" : seen(sight));
+  put(byId("seen"), isJudged(state) ? beside(state) : is in NOT_YET ? "" : seen(sight));
   sign(sought, `verdict-${known}`, told(state) || "no verdict");
 }
+
+/** What has to be said in the same breath as the verdict. */
+const beside = (state) => [...(state.summary?.stability?.provisos ?? []), moved(state)].filter(Boolean).join("; ");
 
 /** What is seen still where a loop is judged steady, or not to be judged: a swing that dies away is in the picture. */
 const moved = ({ verdict, sight }) => (["steady", "undecided"].includes(verdict) && (sight?.word in SIGNS || sight?.word === "dying away") ? `last seen: ${sight.word}` : "");

@@ -1,0 +1,75 @@
+"""What is said in the same breath as ``steady``: friction that holds, one hold of many, a force that ripples."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.judge import judge
+from haploop.launch.stability.looks import LOOKS_S
+from haploop.protocol.scene.effects import Friction
+from helpers.runs.judged import ended, found
+from helpers.scenes.least import scene
+from helpers.scenes.pressed import pressed
+from helpers.scenes.unseen_loops import drawn
+
+
+def with_friction_asked(of) -> Finding:
+    return judge(ended(of), LOOKS_S, frictionless=True)
+
+
+def test_a_wall_beyond_its_limit_that_friction_holds_is_told_apart_from_one_that_rests_without():
+    """The first is beyond rho(M) = 1, the second far below."""
+    loop = drawn(7026)
+    assert loop
+    assert loop.rate_1_s > 0.0
+    held = with_friction_asked(replace(loop.scene, friction=Friction(kinetic=0.17)))
+    stable = with_friction_asked(scene(**pressed(friction={"kinetic": 0.02})))
+    assert (held.word, held.frictionless, held.entries()["stability"]["provisos"]) == (
+        "steady", "swings on", ["only friction holds it"])  # fmt: skip
+    assert (stable.word, stable.frictionless, stable.entries()["stability"]["provisos"]) == ("steady", "rests", [])
+
+
+def test_a_wall_is_steady_that_a_blow_takes_the_device_off_where_friction_keeps_it():
+    """The hold of 0.3 N does not overcome 0.4 N of friction; nothing moves after the first look."""
+    finding = found(scene(**pressed(
+        hand={"force": {"kind": "constant", "value": -0.3}}, friction={"kinetic": 0.4},
+        device={"mass": 0.1, "damping": 0.0, "position": 1e-4, "velocity": -0.2})))  # fmt: skip
+    assert (finding.word, finding.blown, finding.watched_s) == ("steady", "rests off the wall", LOOKS_S[0])
+
+
+def test_the_settling_time_is_that_of_the_second_order_loop():
+    """x decays as e^(-rate t): 5 % are passed at ln(20) / rate, but for half a period (b = 3 N s/m of the device)."""
+    tables = pressed(device={"mass": 0.5, "damping": 3.0}, wall={"position": 0.0, "stiffness": 300.0})
+    finding = found(scene(**tables))
+    rate, half_s = 3.0 / (2 * 0.5) - 300.0 * 1e-3 / (4 * 0.5), math.pi / math.sqrt(300.0 / 0.5)
+    assert finding.settles_s == pytest.approx(math.log(20.0) / rate, abs=half_s)
+
+
+@pytest.mark.parametrize(("force", "said"), [
+    ({"kind": "constant", "value": -1.0}, []),
+    ({"kind": "sine", "amplitude": 0.4, "frequency": 5.0, "offset": -1.0}, ["at its last hold"]),
+])  # fmt: skip
+def test_the_word_for_a_hand_that_moves_is_one_of_its_last_hold(force, said):
+    of = scene(**{**pressed(), "hand": {"force": force}})
+    beside = ["the hand's motion"] if said else []
+    assert found(of).entries(1e-4, beside)["stability"]["provisos"] == said
+
+
+@pytest.mark.parametrize(("ripple_N", "said"), [(0.08, []), (0.12, ["its force ripples"]), (None, [])])
+def test_a_force_that_ripples_by_a_tenth_of_the_hold_is_told_beside_the_word(ripple_N, said):
+    assert Finding("steady", "rest", push_N=0.3).entries(ripple_N=ripple_N)["stability"]["provisos"] == said
+    assert not Finding("limit-cycle", "lasts", push_N=0.3).entries(ripple_N=ripple_N)["stability"]["provisos"]
+
+
+def test_of_a_motion_too_slow_for_its_watch_no_frequency_is_told():
+    tables = pressed(
+        device={"mass": 0.5, "damping": 0.02}, wall={"position": 0.0, "stiffness": 0.3}, diverged_beyond=100.0
+    )
+    end = ended(scene(**tables))
+    finding = judge(end, (1.0, 2.0))
+    assert (finding.word, finding.why, finding.frequency_Hz, finding.rate_1_s) == ("undecided", "too few", 0.0, None)
+    assert "Hz" not in finding.sentence()
