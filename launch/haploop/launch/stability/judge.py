@@ -134,8 +134,8 @@ def judge(end: End, looks_s: Sequence[float] = PATIENT_S, *, frictionless: bool 
     The hand is held still with the mean force of its last contacts, noise is switched off, and two copies of the loop
     are pushed, one ten times as hard as the other. Whatever moves a second later is the loop's own. Most loops tell
     within a second or two; slow ones are watched to the last look. It takes as long as simulating that time twice. One
-    that comes to rest is struck, too, into the wall and off it, which takes as long again. Friction stops small swings of
-    an unstable loop, but wide ones not: where somebody asks, what rests is pushed without its friction as well.
+    that comes to rest is struck, too, into the wall and off it, which takes as long again. Friction stops small
+    swings of an unstable loop, but wide ones not: where somebody asks, what rests is pushed without it as well.
     """
     push_N = push_of(end.hold_N)
     pushes_N = push_N * SMALLER, push_N
