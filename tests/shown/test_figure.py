@@ -7,6 +7,7 @@ import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,10 @@ from haploop.logger import read
 from haploop.tools.figure.data import TOGETHER, FigureError, History, RunData
 from haploop.tools.figure.loops import force_position_loop, momentum_loop
 from haploop.tools.figure.run_figure import draw, event_lines, key_numbers, make_figure
+from haploop.tools.figure.scene_units import element_units
 from haploop.tools.figure.time import extremes
 from helpers.live.launched import first_and_slowly
-from helpers.scenes.least import scene
+from helpers.scenes.least import WALL, scene
 from helpers.shown import artists
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
@@ -186,6 +188,31 @@ def test_events_are_marked_at_their_times_and_named(runs: dict[str, Path]) -> No
     (words,) = event_lines(data)[:1]
     assert "1 at 0.95 s: element 1 becomes unidirectional-inertia (mass 0.002 kg)" in words
     assert "3 at 1.1 s: element 0 is removed" in " ".join(event_lines(data))
+
+
+def test_what_events_set_is_told_with_the_unit_that_it_has_at_that_time() -> None:
+    before = scene(wall=WALL, dissipation=[{"kind": "damping", "damping": 1.0}])
+    inertia = {"kind": "unidirectional-inertia", "mass": 0.002}
+    events: list[dict[str, Any]] = [
+        {"timestamp": 0.1, "set": {"wall.stiffness": 200.0, "dissipation.0.damping": 2.0}},
+        {"timestamp": 0.2, "swap": inertia, "element": 0},
+        {"timestamp": 0.3, "set": {"dissipation.0.mass": 0.001, "clock.round_trip_delay": 0.002}},
+    ]
+    data: Any = SimpleNamespace(scene=before, events=events, units=element_units())
+    told = " ".join(event_lines(data))
+    assert "set wall.stiffness = 200 N/m, dissipation.0.damping = 2 N s/m" in told
+    assert "set dissipation.0.mass = 0.001 kg, clock.round_trip_delay = 0.002 s" in told
+
+
+@pytest.mark.parametrize("count", [2, 12])
+def test_key_numbers_that_are_too_long_for_a_line_take_two_and_none_is_cut(
+    runs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, count: int
+) -> None:
+    words = [f"a number of {number} millimetres" for number in range(count)]
+    monkeypatch.setattr("haploop.tools.figure.run_figure.key_numbers", lambda _run: words)
+    (numbers,) = artists(make_figure(RunData.from_directory(runs["busy"])), "numbers")
+    assert all(word in numbers.get_text() for word in words)
+    assert numbers.get_text().count("\n") == (count > 2)
 
 
 def test_a_change_that_was_refused_leaves_history_as_it_was() -> None:

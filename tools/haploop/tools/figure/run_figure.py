@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from haploop.protocol.changes import describe
+from haploop.protocol.changes import Change, describe, is_change
 from haploop.tools.figure import style
 from haploop.tools.figure.data import TOGETHER, Book, RunData
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
 from haploop.tools.figure.own_columns import draw_own_columns, own_columns
+from haploop.tools.figure.scene_units import unit_at
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
 from haploop.tools.render.report import HELD, count_losses, leak_rows, plant_books, swing_words
 from haploop.tools.render.terminal import told
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 # What has room in the table and below the figure; longer names of books are smaller.
 _MOST_BOOKS, _NAME_LETTERS, _MOST_LINES, _LINE_LETTERS = 7, 56, 2, 225
+
+_GAP = "   ·   "
 
 # Books of the plant that belong to a force which is drawn.
 _LINES = {"friction_heat_J": "friction", "actuator_J": "actuator"}
@@ -84,8 +87,12 @@ def _draw_header(figure: Figure | SubFigure, run: RunData) -> None:
     look: dict[str, Any] = {"color": style.INK, "va": "center"}
     title = figure.text(right + 0.018, 0.66, run.scene.title, fontsize=style.LARGE, gid="title", **look)
     style.fit_text(title, figure.bbox.width * (0.97 - right), smallest=1.0)
-    numbers = figure.text(0.006, 0.16, "   ·   ".join(key_numbers(run)), fontsize=style.TEXT + 1, gid="numbers", **look)
-    style.fit_text(numbers, figure.bbox.width * 0.985)
+    words, room_px = key_numbers(run), figure.bbox.width * 0.985
+    numbers = figure.text(0.006, 0.16, _GAP.join(words), fontsize=style.TEXT + 1, gid="numbers", **look)
+    if numbers.get_window_extent().width > room_px:
+        half = (len(words) + 1) // 2
+        numbers.set_text(f"{_GAP.join(words[:half])}\n{_GAP.join(words[half:])}")
+    style.fit_text(numbers, room_px)
 
 
 def key_numbers(run: RunData) -> list[str]:
@@ -169,9 +176,11 @@ def book_rows(run: RunData, books: list[Book]) -> list[Row]:
 
 def event_lines(run: RunData) -> list[str]:
     """Returns the numbered events as lines that fit below the figure."""
-    lines = [""]
+    lines, scene = [""], run.scene
     for number, event in enumerate(run.events, start=1):
-        words = f"{number} at {event['timestamp']:g} s: {describe(event, run.units)}"
+        units = {key: unit_at(scene, key, run.units) for key in event.get("set", ())}
+        scene = Change.from_dict(0, event).apply(scene) if is_change(event) else scene
+        words = f"{number} at {event['timestamp']:g} s: {describe(event, {**run.units, **units})}"
         if lines[-1] and len(lines[-1]) + len(words) + 5 > _LINE_LETTERS:
             if len(lines) == _MOST_LINES:
                 lines[-1] += f"     and {len(run.events) - number + 1} more"
