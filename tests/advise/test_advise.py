@@ -62,6 +62,8 @@ def test_an_advice_says_first_that_it_is_an_upper_bound_goes_on_when_stopped_and
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout.splitlines()[-1])
     assert found["headline"].startswith("Upper bound, not advice: premium15 is taken as rigid")
+    assert "for a hand: of 0.269 kg, 6.43 N s/m and 105 N/m, each 20 % more or less" in found["advice"]
+    assert "loses most: no friction: 0." in found["advice"]
     lines = (out / "walls.jsonl").read_text().splitlines()
     advised = load(out / "advice.toml")
     assert value_at(advised, "wall.stiffness") == found["recommended"]["stiffness_N_m"]

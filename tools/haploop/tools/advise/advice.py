@@ -19,6 +19,7 @@ from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.walls.store import Failure, Tried
 from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.linear.linearity import installed_kinds
+from haploop.tools.render.units import spring
 
 # An advice as one JSON object.
 AdviceData = dict[str, Any]
@@ -36,7 +37,7 @@ HOLDS_MORE = (
     "A {0} ({1}), which renders less than its wall, may hold more: {2:.2g} N/mm in the loop as described. It was not "
     "tried in every corner; `haploop compare` tells what it holds."
 )
-FELL = "With {0} it bears {1:.2g} N/mm in every corner at three holds; tried further, it fails from {2:.2g} N/mm on."
+FELL = "With {0} walls of {1} bear every corner at three holds; at more holds and under attack one of {2} does not."
 NO_OTHER = "None of these bears {0:.2g} N/mm in the loop as described, at seven parameters each: {1}."
 READING = (
     "Every corner: what is uncertain 20 % more or less, what is assumed half or twice, in all combinations, or 32 of "
@@ -69,6 +70,7 @@ class Advice:
         tried_by: what every wall was tried by, in words.
         uncertain: the factors between which each uncertain quantity, or assumed number, was taken.
         not_varied: what the loop has and was taken as described.
+        hand: its mass, kg, damping, N s/m, and stiffness, N/m; None where there is none.
         described: the limit of the loop as described, with the element advised or without any.
         changed, without: that after each change of the device, and without each cause of buzzing, best first.
         assumed: each assumed number with the limit at half and at double of it.
@@ -83,6 +85,7 @@ class Advice:
     tried_by: str
     uncertain: dict[str, tuple[float, float]]
     not_varied: tuple[str, ...]
+    hand: tuple[float, float, float] | None
     found: Found
     formulas: tuple[Formula, ...]
     published: tuple[Published, ...]
@@ -110,7 +113,7 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
     told = [NO_OTHER.format(found.simple_N_m / 1e3, "; ".join(each.name for each in found.others))] * bool(found.others)
     told += [HOLDS_MORE.format(of.family.name, of.family.words(of.values), of.held_N_m / 1e3) for of in found.hidden]
     told += [
-        FELL.format(of.family.phrase(of.values), of.safe.stiffness_N_m / 1e3, below / 1e3)
+        FELL.format(of.family.phrase(of.values), spring(of.safe.stiffness_N_m), spring(below))
         for of, below in found.fell
         if of.safe
     ]
@@ -142,6 +145,7 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
         tried_by=task_words(loop),
         uncertain=(of := ranges(loop, keys)),
         not_varied=as_built(loop, of),
+        hand=(loop.hand.mass, loop.hand.damping, loop.hand.stiffness) if scene.hand and loop.hand else None,
         found=found,
         formulas=tuple(formulas(loop)),
         published=PUBLISHED.get(subject.name, ()),

@@ -20,7 +20,9 @@ _NO_WALL = "none: no wall bears every case"
 _NOTHING_BREAKS = "nothing that was tried"
 # A changed limit tells something where it differs by more than how closely it is known.
 _TELLS = 1.2
-_NO_CHANGE = "no single change that was tried gains a fifth"
+_NO_CHANGE, _NO_LOSS = "no single change that was tried gains a fifth", "no single change that was tried costs a sixth"
+_HAND = "of {0}, {1} and {2}, each 20 % more or less; another may make this wall buzz (--hand)"
+_NO_HAND = "none but its force: a hand may make this wall buzz (--hand)"
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
 _ALONE = "{0} without one, searched and attacked alike"
 # What is assumed, how much that costs, and what to measure.
@@ -52,6 +54,8 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     found, best = told.found, told.found.advised
     safe = _SAFE.format(format_stiffness(found.stiffness_N_m), best.family.phrase(best.values))
     lines = [("at most" if told.is_ideal else "safe up to", safe if found.stiffness_N_m else _NO_WALL)]
+    hand = [f"{fixed(value)} {unit}" for value, unit in zip(told.hand or (), ("kg", "N s/m", "N/m"), strict=False)]
+    lines.append(("for a hand", _HAND.format(*hand) if hand else _NO_HAND))
     if found.as_assumed:
         lines.append(("assumes", assumes(told, found.as_assumed)))
     if found.stiffness_N_m and best.values:
@@ -61,6 +65,9 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     lines.append(("breaks first", breaks))
     gains = [f"{row.words}: {fixed(row.factor, 2)} times" for row in told.changed if row.factor >= _TELLS]
     lines.append(("gains most", "; ".join(gains[:3]) or _NO_CHANGE))
+    worst = sorted((*told.changed, *told.without), key=lambda row: row.factor)
+    loses = [f"{row.words}: {fixed(row.factor, 2)} times" for row in worst if row.factor * _TELLS <= 1.0]
+    lines.append(("loses most", "; ".join(loses[:3]) or _NO_LOSS))
     if told.published:
         values = [f"{format_stiffness(value.stiffness_N_m)} ({value.by})" for value in told.published]
         lines.append(("published", ", ".join(values)))
