@@ -55,6 +55,7 @@ class Part:
         """Returns name and value of what there is to compare."""
         return [
             ("verdict", self.verdict),
+            ("proviso", "; ".join(self.summary.get("stability", {}).get("provisos", ())) or "–"),
             ("position swings by", amount(self.swing_m, "m")),
             ("force swings by", amount(self.force_swing_N, "N")),
             ("at", amount(self.frequency_Hz, "Hz")),
