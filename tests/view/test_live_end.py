@@ -48,7 +48,7 @@ def test_the_verdict_comes_when_the_launcher_has_judged_the_run_and_until_then_i
 ):
     may_judge, launcher = threading.Event(), [True]
 
-    def waits(*given):
+    def waits(*given, **named):
         assert may_judge.wait(PATIENCE_S)
         return Finding("steady", "rest", push_N=0.2)
 
