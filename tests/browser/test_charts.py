@@ -7,6 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 from helpers.live.browser import DESK, IN_BOTH, PHONE, seen, settled, still
+from helpers.live.stand_in import RUNS
 from oracles.snapshots import contact, snapshot, table
 
 NAN = math.nan
@@ -42,6 +43,20 @@ def test_a_line_goes_through_its_values_and_is_broken_where_there_are_none(stand
     for part, (first, last) in ((0.2, left), (0.8, right)):
         expected = 0.5 + height * (0.5 - part)
         assert first - 0.03 <= expected <= last + 0.03
+
+
+@pytest.mark.parametrize("diverged", [True, False])
+def test_a_run_drawn_behind_that_diverged_leaves_the_axis_to_the_run_on_show(stand_in, page, diverged):
+    ramp = [0.01 * i / (ROWS - 1) for i in range(ROWS)]
+    step = 2.0 / (ROWS - 1)
+    own = table("position", 0.0, step, ("x", "m", "position", ramp))
+    away = table("overlay_position", 0.0, step, ("x", "m", "position", [100 * x for x in ramp]))
+    stand_in.tell({**RUNS, "overlay": "wall-1", "overlay_diverged": diverged})
+    stand_in.show(snapshot(0.0, 2.0, own, away))
+    settled(page, "position", "10.000")
+    (drawn,) = seen(page, "position", [0.8], "ink")
+    assert drawn
+    assert (drawn[0] < 0.4) == diverged, drawn
 
 
 @pytest.mark.slow

@@ -104,7 +104,9 @@ def test_on_a_desk_the_answer_the_charts_and_the_controls_are_there_without_scro
 @pytest.mark.parametrize("viewport", first_and_slowly(DESK, PHONE, TABLET, LARGE))
 def test_nothing_covers_anything_and_no_text_is_cut_off(viewport, stand_in, open_page, scheme):
     page = shown(stand_in, open_page, viewport, scheme)
-    page.evaluate("document.querySelector('nav').style.position = 'static'")  # it floats over the phone's lower edge
+    page.evaluate(
+        "document.querySelector('nav > *').style.position = 'static'"
+    )  # it floats over the phone's lower edge
     assert page.evaluate(OVERLAPS) == []
     assert page.evaluate(CUT) == []
     assert page.evaluate(SIDEWAYS) == 0, "no scrolling sideways"
@@ -148,6 +150,21 @@ def test_on_a_phone_fingers_find_their_targets(stand_in, open_page):
     page = shown(stand_in, open_page, PHONE, "light", has_touch=True, is_mobile=True)
     for selector in ("#pause", "[data-step='1']", "#stop", "#freeze", "#swap-do", "#swap-damping"):
         assert page.locator(selector).bounding_box()["height"] >= 40, selector
+
+
+def test_on_a_phone_one_row_of_controls_floats_runs_have_the_whole_width_and_every_chart_its_times(stand_in, open_page):
+    page = shown(stand_in, open_page, PHONE, "light", has_touch=True, is_mobile=True)
+    page.evaluate("scrollTo(0, 1000)")
+    floating = [box for row in page.locator("nav > *").all() if (box := row.bounding_box()) and box["y"] > 0]
+    assert len(floating) == 1
+    assert floating[0]["height"] < 60
+    for picker in ("#run", "#overlay", "#swap-element", "#swap-kind"):
+        assert page.locator(picker).bounding_box()["width"] > 300, picker
+    for chart in ("position", "force", "energy"):
+        plot, over = (page.locator(f"#{chart} {part}").bounding_box() for part in (".plot", ".u-over"))
+        assert plot["y"] + plot["height"] - over["y"] - over["height"] > 30, chart
+    stand_in.state(**ENDED)
+    expect(page.locator("#to-forms")).to_be_hidden()
 
 
 @pytest.mark.slow

@@ -86,6 +86,19 @@ def test_one_can_be_added_past_the_end_and_one_removed(stand_in, page):
     assert order(stand_in, page, lambda: page.click("#swap-do")) == ("swap", {"swap": {"kind": "none"}, "element": 0})
 
 
+def test_the_swap_form_follows_what_is_set_until_something_is_chosen_in_it(stand_in, page):
+    def set_damping(value):
+        element = {**OPTIONS["elements"][0], "damping": value}
+        stand_in.state(title=f"damping {value}", options={**OPTIONS, "elements": [element, *OPTIONS["elements"][1:]]})
+        expect(page.locator("#title")).to_have_text(f"damping {value}")
+
+    set_damping(2.5)
+    expect(page.locator("#swap-damping")).to_have_value("2.5")
+    page.fill("#swap-damping", "7")
+    set_damping(3.5)
+    assert page.input_value("#swap-damping") == "7"
+
+
 @pytest.mark.slow
 def test_the_form_starts_from_the_element_as_it_is_and_says_what_a_kind_does(stand_in, page):
     assert page.input_value("#swap-kind") == "damping"

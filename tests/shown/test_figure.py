@@ -190,6 +190,13 @@ def test_events_are_marked_at_their_times_and_named(runs: dict[str, Path]) -> No
     assert "3 at 1.1 s: element 0 is removed" in " ".join(event_lines(data))
 
 
+def test_the_close_view_is_of_a_time_of_which_the_plant_was_logged(runs: dict[str, Path]) -> None:
+    data = RunData.from_directory(runs["busy"])
+    assert data.close_s()[0] > 1.1
+    first, last = replace(data, t_s=data.t_s[data.t_s < 1.1]).close_s()
+    assert first < 1.1 <= last + 0.2
+
+
 def test_what_events_set_is_told_with_the_unit_that_it_has_at_that_time() -> None:
     before = scene(wall=WALL, dissipation=[{"kind": "damping", "damping": 1.0}])
     inertia = {"kind": "unidirectional-inertia", "mass": 0.002}

@@ -51,6 +51,10 @@ def test_a_viewer_shows_one_recorded_run_and_draws_another_over_it(recorded):
         await viewer.open("second")
         await viewer.lay_over("first")
         assert (viewer.listing()["shown"], viewer.listing()["overlay"]) == ("second", "first")
+        assert viewer.listing()["overlay_diverged"] is False
+        assert viewer.overlay
+        viewer.overlay.summary = {**(viewer.overlay.summary or {}), "verdict": "diverged"}
+        assert viewer.listing()["overlay_diverged"] is True
         for wrong in ("", "third", "../first", "/etc"):
             with pytest.raises(CommandFailed, match="no run"):
                 await viewer.open(wrong)

@@ -91,14 +91,22 @@ class Viewer:
                 await self._complete(session)
 
     def listing(self) -> Message:
-        """Returns the live runs, the recorded ones, and which are on show, looked for now and then."""
+        """Returns the live runs, the recorded ones, and which are on show, looked for now and then.
+
+        ``overlay_diverged`` tells of the one drawn behind whether its numbers left every bound.
+        """
         if wall_clock.monotonic() - self._listed[0] > _LIST_S:
             named = {
                 kind: [{"id": run.id, "title": run.title} for run in runs]
                 for kind, runs in (("live", self._runs.live()), ("past", self._runs.past()))
             }
             self._listed = wall_clock.monotonic(), named
-        shown = {"shown": self.session and self.session.run.id, "overlay": self.overlay and self.overlay.run.id}
+        behind = self.overlay and self.overlay.summary
+        shown = {
+            "shown": self.session and self.session.run.id,
+            "overlay": self.overlay and self.overlay.run.id,
+            "overlay_diverged": bool(behind) and behind["verdict"] == "diverged",
+        }
         return {"type": "runs", **self._listed[1], **shown}
 
     async def open(self, run_id: str) -> str:

@@ -98,6 +98,7 @@ ENDED = {
 RUNS = {
     "type": "runs", "live": [{"id": "abc123", "title": "one"}, {"id": "def456", "title": "two"}],
     "past": [{"id": "wall-1", "title": "wall-1"}], "shown": "abc123", "overlay": None,
+    "overlay_diverged": False,
 }  # fmt: skip
 
 

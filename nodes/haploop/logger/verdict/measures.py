@@ -34,7 +34,7 @@ class Figures(NamedTuple):
         outside_fraction: share of its ticks that are out of contact.
         displayed_stiffness_N_m: mean of total force over penetration, ticks in contact (Choi et al. 2022, V.B.2), but
             those whose penetration is a rounding error of the wall's position; None of none.
-        penetration_mean_m: ticks in contact; None of none.
+        penetration_mean_m: of the measured position, ticks in contact; None of none.
         force_ripple_N: what the commanded force swings by above 30 Hz, peak to peak; see ``ripple``.
         force_swing_N: the commanded force as it is, peak to peak.
     """

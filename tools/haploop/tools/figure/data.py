@@ -193,7 +193,9 @@ class RunData:
     def close_s(self) -> tuple[float, float]:
         """Returns the time of the close view: the last contact, or the end of a run without any."""
         first, last = self.span_s
+        # Of a run that failed the log of the controller may go on beyond that of the plant.
         contact = self.contact_s()
+        contact = contact[contact <= self.t_s.max(initial=first)]
         if not len(contact):
             return max(first, last - _CLOSE_S), last
         recent = contact[contact > contact[-1] - _CLOSE_S]

@@ -109,7 +109,9 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     if window["penetration_mean_m"] is not None:
         depth = f"{amount(window['penetration_mean_m'], 'm')} on average"
         outside = 100 * window["outside_fraction"]
-        figures.append(("penetration", depth + (f", outside the wall {outside:.0f} % of the time" if outside else "")))
+        figures.append(
+            ("penetration measured", depth + (f", outside the wall {outside:.0f} % of the time" if outside else ""))
+        )
     if window["displayed_stiffness_N_m"] is not None:
         beyond = " at the motor; the cable gives way, too" if "cable_heat_J" in summary["energy"] else ""
         figures.append(("displayed stiffness", spring(window["displayed_stiffness_N_m"]) + beyond))

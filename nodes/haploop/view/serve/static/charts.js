@@ -31,8 +31,9 @@ export class Charts {
    * @param {object} snapshot as decoded.
    * @param {object} state the run's state.
    * @param {object[]} marks what changed the run.
+   * @param {boolean} fits whether the axes have room for the run that is drawn behind, too.
    */
-  show(snapshot, state, marks) {
+  show(snapshot, state, marks, fits = true) {
     const { from_s, to_s, tables } = snapshot;
     this.viewport.shown = [from_s, to_s];
     for (const [name, chart] of Object.entries(this.charts)) {
@@ -42,6 +43,7 @@ export class Charts {
         marks,
         note: name === "energy" ? residual(state) : "",
         overlay: tables[`overlay_${name}`] ?? null,
+        fits,
       });
     }
     this.panels.show(snapshot, state, marks);

@@ -87,7 +87,7 @@ function showState() {
   charts.panels.offer(state);
   time.update(state);
   const goesOn = Boolean(state.options) && !state.summary;
-  byId("swap").hidden = byId("set").hidden = !goesOn;
+  byId("swap").hidden = byId("set").hidden = byId("to-forms").hidden = !goesOn;
   byId("undo").hidden = !goesOn || !marks.some(({ changes }) => changes);
   byId("nothing-yet").hidden = goesOn || Boolean(state.summary);
   if (state.options) {
@@ -124,7 +124,7 @@ function draw() {
 
 function redraw() {
   if (!snapshot) return;
-  charts.show(snapshot, state, marks);
+  charts.show(snapshot, state, marks, !runs.listing?.overlay_diverged);
   scrubber.show(snapshot, marks);
   sound.play(snapshot, state);
 }

@@ -26,7 +26,7 @@ export class SwapForm {
 
   /** Follow the run: its kinds, and the elements at work. What is being typed stays. */
   update(options) {
-    const known = JSON.stringify([options.kinds, options.elements.map(({ kind }) => kind)]);
+    const known = JSON.stringify([options.kinds, options.elements]);
     if (known === this.known) return;
     const isFirst = this.known === "";
     Object.assign(this, { known, kinds: options.kinds, elements: options.elements });

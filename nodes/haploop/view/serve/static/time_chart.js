@@ -13,6 +13,8 @@ import { extent, Range } from "./range.js";
 
 const CURSORS = "haploop";
 const DECIMALS = 3;
+// Where the charts lie one below the other, each has its times: that of the last is out of sight.
+const NARROW = matchMedia("(max-width: 699px)");
 const OVERLAY = { colour: "mark", width: 1 };
 
 export class TimeChart {
@@ -31,6 +33,7 @@ export class TimeChart {
     this.lines = [];
     this.rough = [];
     this.overlay = null;
+    this.fits = true;
     this.columns = [];
     this.t = new Float64Array(0);
     this.span = [0, 1];
@@ -45,9 +48,12 @@ export class TimeChart {
       this.draw();
     });
     new ResizeObserver(() => this.resize()).observe(this.plot);
+    this.turn = () => this.build();
+    NARROW.addEventListener("change", this.turn);
   }
 
   remove() {
+    NARROW.removeEventListener("change", this.turn);
     this.u.destroy();
     this.host.remove();
   }
@@ -77,7 +83,7 @@ export class TimeChart {
         y: { auto: false, range: () => this.range.now },
       },
       series: [{}, ...series],
-      axes: [times ? bottomAxis("simulated time (s)") : bareAxis(), leftAxis(named(label, this.unit.name))],
+      axes: [times || NARROW.matches ? bottomAxis("simulated time (s)") : bareAxis(), leftAxis(named(label, this.unit.name))],
       cursor: {
         y: false,
         points: { show: false },
@@ -105,14 +111,14 @@ export class TimeChart {
    * @param {Float64Array} t times of the numbers, s.
    * @param {{key: string, label: string, line: object, values: ArrayLike<number>}[]} lines
    * @param {object} more wall: {values, side} to shade, or null; marks; note for the end of the legend;
-   *   overlay: the table of another run, or null.
+   *   overlay: the table of another run, or null; fits: whether the axis has room for that one, too.
    */
-  show(span, t, lines, { wall = null, marks = [], note = "", overlay = null } = {}) {
+  show(span, t, lines, { wall = null, marks = [], note = "", overlay = null, fits = true } = {}) {
     const signature = (list) => JSON.stringify(list.map(({ key, label }) => [key, label]));
     const isNew = signature(lines) !== signature(this.lines);
     const climbs = this.climb(lines);
     const columns = lines.map(({ values }) => scaled(values, this.unit.factor));
-    Object.assign(this, { span, t, lines, wall, marks, note, overlay, columns });
+    Object.assign(this, { span, t, lines, wall, marks, note, overlay, fits, columns });
     this.rerange();
     if (isNew || climbs) {
       this.legend.name(lines);
@@ -131,7 +137,7 @@ export class TimeChart {
 
   rerange() {
     const shown = this.columns.filter((_, i) => this.legend.isShown(this.lines[i].key));
-    if (this.overlay) shown.push(scaled(this.overlay.columns[0].values, this.unit.factor));
+    if (this.overlay && this.fits) shown.push(scaled(this.overlay.columns[0].values, this.unit.factor));
     this.range.follow(...extent(shown, this.options.zero && shown.length ? [0] : []));
   }
 
