@@ -51,13 +51,13 @@ def check_motion(seed: int) -> None:
     rng = np.random.default_rng(1000 + seed)
     base = drawn_base(seed)
     scenes = [base, *(varied(base, rng) for _ in range(15))]
-    found, expected = loops_of(scenes, True), loops_of(scenes, False)
+    found = loops_of(scenes, True)
+    expected = loops_of([nudged(each, nudge) for nudge in (0.0, 1e-16, -1e-16) for each in scenes], False)
     ticks = min(result["ticks"] for result in expected.results if result)
-    x, truth = (positions(loops, ticks) for loops in (found, expected))
+    x, (truth, *others) = positions(found, ticks), np.split(positions(expected, ticks), 3, axis=1)
     scale = np.abs(truth).max(axis=0)
     steady = np.ones(len(scenes), bool)
-    for nudge in (1e-16, -1e-16):
-        other = positions(loops_of([nudged(each, nudge) for each in scenes], False), ticks)
+    for other in others:
         steady &= np.abs(other - truth).max(axis=0) < 1e-12 * scale
     assert np.count_nonzero(steady) >= 8, "few of these loops can be compared; the test needs another scene"
     away = np.abs(x - truth).max(axis=0)[steady] / scale[steady]

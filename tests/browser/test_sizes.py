@@ -102,8 +102,8 @@ def test_on_a_desk_the_answer_the_charts_and_the_controls_are_there_without_scro
 
 @IN_BOTH
 @pytest.mark.parametrize("viewport", first_and_slowly(DESK, PHONE, TABLET, LARGE))
-def test_nothing_covers_anything_and_no_text_is_cut_off(viewport, stand_in, open_page, scheme):
-    page = shown(stand_in, open_page, viewport, scheme)
+def test_nothing_covers_anything_and_no_text_is_cut_off(viewport, stand_in, open_page):
+    page = shown(stand_in, open_page, viewport, "dark")
     page.evaluate(
         "document.querySelector('nav > *').style.position = 'static'"
     )  # it floats over the phone's lower edge

@@ -8,25 +8,14 @@ import shlex
 import signal
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
 from haploop.launch.processes.foreign import Program, ProgramError, check_wait, read_programs
 from haploop.launch.processes.run_directory import CommandRefused
-from haploop.tools.cli.app import app
 from helpers.live.foreign import PLAIN, Started
-from helpers.live.launched import (
-    BRIEF,
-    BRIEF_S,
-    SCENE,
-    command,
-    first_and_slowly,
-    processes,
-    same_bits,
-    wait_for,
-)
+from helpers.live.in_process import ask
+from helpers.live.launched import BRIEF, BRIEF_S, SCENE, first_and_slowly, processes, same_bits, wait_for
 
 # Ways to fail that only a deadline finds.
 WAITED_FOR = ("hang", "silent", "mute", "unfinished")
@@ -113,7 +102,7 @@ def test_a_program_that_ignores_every_end_and_its_children_end_with_the_run(
 
 @pytest.mark.parametrize(
     ("options", "words"),
-    first_and_slowly(
+    [
         (["--node", "controller=no-such-program-9"], "'no-such-program-9', is not there or cannot be executed"),
         (["--node", "controller=sh 'x"], "cannot be split into words: No closing quotation"),
         (["--node", "controller="], "is empty"),
@@ -127,16 +116,15 @@ def test_a_program_that_ignores_every_end_and_its_children_end_with_the_run(
         (["--external", "plant", "--wait", "nan"], "--wait"),
         (["--external", "plant", "--wait", "1e300"], "--wait"),
         (["--wait", "3"], "--wait is for --external"),
-    ),
+    ],
 )
 def test_what_cannot_be_a_program_is_refused_before_anything_is_written(
     options: list[str], words: str, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    done = command("run", str(SCENE), *options, "--out", str(out))
-    assert (done.returncode, done.stdout) == (2, "")
-    assert words in done.stderr
-    assert "Traceback" not in done.stderr
+    answer = ask("run", str(SCENE), *options, "--out", str(out))
+    assert (answer.status, answer.stdout, answer.broken()) == (2, "", "")
+    assert words in answer.stderr
     assert not out.exists()
 
 
@@ -155,13 +143,10 @@ def test_a_command_is_split_as_a_shell_splits_it_but_given_to_none() -> None:
 
 
 def test_no_scene_can_name_a_program() -> None:
-    def ask(*arguments: str) -> Any:
-        return CliRunner().invoke(app, [*arguments])
-
     for key in ("run.node", "run.nodes", "node", "external", "run.external", "run.programs"):
-        assert ask("check", str(SCENE), "--set", f'{key}="sh"').exit_code == 2, key
+        assert ask("check", str(SCENE), "--set", f'{key}="sh"').status == 2, key
     schema = ask("check", "--schema")
-    assert schema.exit_code == 0
+    assert schema.status == 0
     assert not any("node" in key or "external" in key for key in json.loads(schema.stdout)["$defs"])
 
 

@@ -108,7 +108,7 @@ def test_undo_brings_back_the_code_before_a_reload_and_one_taken_back_is_told_at
 @pytest.mark.slow
 def test_a_reload_that_never_ends_is_answered_and_the_run_ends_as_it_would_have(running, scene, tmp_path):
     plugin, run = braked(running, scene, tmp_path)
-    plugin.write_text(source(at_force="while True: pass"))
+    plugin.write_text(source(at_force="time.sleep(1000)"))
     with pytest.raises(run_directory.CommandRefused, match="10 s were not enough as the element brake was made"):
         run.ask("swap", **SWAP, reload=True)
     run.ask("stop")

@@ -55,8 +55,10 @@ def silent(tmp_path_factory: pytest.TempPathFactory) -> str:
     return run_in_process(load(SCENES / "fig6a.toml", SETS, kinds), kinds)["trajectory_sha256"]
 
 
-@pytest.mark.parametrize("unbuffered", first_and_slowly("1", ""))
-@pytest.mark.parametrize("kind", first_and_slowly(*KINDS))
+@pytest.mark.parametrize(
+    ("kind", "unbuffered"),
+    first_and_slowly(*((kind, "1") for kind in KINDS), ("binary", ""), ("no newline", ""), ("closes", "")),
+)
 def test_an_element_that_prints_leaves_the_run_and_its_bits_as_they_are(
     kind, unbuffered, running, tmp_path, silent, monkeypatch
 ):

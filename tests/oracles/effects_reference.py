@@ -72,7 +72,7 @@ class Bodies:
         n = self.count
         x, v = z[:n], z[n : 2 * n]
         force = -self.ground * v
-        pull = self.link_k * np.diff(x) + self.link_b * np.diff(v)
+        pull = self.link_k * (x[1:] - x[:-1]) + self.link_b * (v[1:] - v[:-1])
         force[:-1] += pull
         force[1:] -= pull
         force[0] += z[2 * n] if self.actuator_rate else command
@@ -93,7 +93,8 @@ class Bodies:
         applied = z[2 * n] if self.actuator_rate else command
         energies = [load * v[-1], applied * v[0], self.friction_N(v[0]) * self.sliding * v[0]]
         low_passed = [self.actuator_rate * (command - z[2 * n]), self.meter_rate * (a[self.meter_body] - z[2 * n + 1])]
-        return np.concatenate([v, a, low_passed, energies, self.ground * v**2, self.link_b * np.diff(v) ** 2])
+        stretching = v[1:] - v[:-1]
+        return np.concatenate([v, a, low_passed, energies, self.ground * v**2, self.link_b * stretching**2])
 
     def stored_J(self) -> float:
         """Kinetic energy and that of all springs."""

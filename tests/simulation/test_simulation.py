@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from simulation.computer import network
-from simulation.defects import DEFECTS, put_back, seeds_needed
+from simulation.defects import DEFECTS, put_back
 from simulation.faults import Kill, LateStart, Slow, Stop, When
 from simulation.plan import Plan, draw, fewest, shrink, tell
 from simulation.play import play
@@ -20,6 +22,7 @@ from simulation.visitors import Impostor, SecondLogger, Stranger
 _STARTS_S = {"plant": 0.1, "controller": 0.2, "logger": 0.3}
 _CALM = Plan(0, "wall", 0.0, 1e-4, math.inf, _STARTS_S, ())
 _STAYS = ("stays", 0.0)
+_PAGE = (Path(__file__).parents[2] / "docs/reliability.md").read_text(encoding="utf-8")
 # Histories that once broke a promise: nodes waited for, and a run ended, by the deadline of a loop that runs; a clock
 # that asked the time without end while nodes loaded; an impostor's refusal told as the reason of a death.
 _RECORDED = {
@@ -54,8 +57,8 @@ def test_a_share_of_the_seeds_keeps_every_promise(part: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(10))
-def test_a_thousand_seeds_keep_every_promise(part: int) -> None:
-    assert broken_in(range(100 * part, 100 * part + 100)) == ""
+def test_five_hundred_seeds_keep_every_promise(part: int) -> None:
+    assert broken_in(range(30 + 50 * part, 80 + 50 * part)) == ""
 
 
 @pytest.mark.parametrize("pace", [math.inf, 0.5])
@@ -135,12 +138,10 @@ def test_a_failing_history_is_told_without_the_faults_that_have_no_part_in_it() 
     assert (shortest.jumpiness, shortest.scene) == (0.0, "least")
 
 
-@pytest.mark.parametrize("defect", ["a grant goes back when a slower node joins", "END with a reason is not sent"])
-def test_a_defect_put_back_is_found_at_once(defect: str) -> None:
-    assert seeds_needed(defect, 50) is not None
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("defect", DEFECTS)
-def test_every_defect_put_back_is_found_within_ten_thousand_seeds(defect: str) -> None:
-    assert seeds_needed(defect, 10_000) is not None
+def test_every_defect_put_back_is_found_by_the_seed_that_the_page_names(defect: str) -> None:
+    """Where it is not, ``python -m simulation.defects`` tells the page's seeds anew."""
+    row = re.search(rf"^\| {re.escape(defect)} \| (\d+) \|$", _PAGE, re.MULTILINE)
+    assert row, f"docs/reliability.md has no seed for: {defect}"
+    with put_back(defect):
+        assert play(draw(int(row[1]))).broken

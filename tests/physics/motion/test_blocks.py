@@ -26,20 +26,24 @@ def test_blocks_and_windows_of_any_size_give_the_same_summary_of_drawn_scenes(se
 
 
 @pytest.mark.parametrize(
-    "path",
-    [pytest.param(p, marks=[pytest.mark.slow] * (p.stem not in ("fig6c", "swap")), id=p.stem) for p in SCENES],
+    ("path", "delay"),
+    [
+        pytest.param(path, delay, marks=[pytest.mark.slow] * (path.stem not in ("fig6c", "swap") or delay != 13))
+        for index, path in enumerate(SCENES)
+        for delay in (13, (0, 3, 10, 20, 50)[index % 5])
+    ],
+    ids=lambda value: value.stem if isinstance(value, Path) else None,
 )
-@pytest.mark.parametrize("delay", [13, *(pytest.param(d, marks=pytest.mark.slow) for d in (0, 3, 10, 20, 50))])
 def test_blocks_of_any_size_give_the_same_summary_of_every_shipped_scene(path, delay):
+    """At 1.8 s all are in contact, and the swap is 0.3 s past."""
     scene = load(path, [f"clock.round_trip_delay={delay / 10_000}"])
-    if delay == 13:  # at 1.8 s all are in contact, and the swap is 0.3 s past
-        scene = replace(scene, duration=min(scene.duration, 1.8))
+    scene = replace(scene, duration=min(scene.duration, 1.8))
     usual = in_blocks(scene, 100)
     for block_ticks in (1, 7, 1000):
         assert in_blocks(scene, block_ticks) == usual
 
 
-@pytest.mark.parametrize("delay", [13, *(pytest.param(d, marks=pytest.mark.slow) for d in (0, 3, 10, 20, 50))])
+@pytest.mark.parametrize("delay", [13, *slowly([0, 10, 50])])
 def test_processes_with_small_blocks_and_the_least_window_give_the_bits_of_one_process(delay, tmp_path):
     """A swap in mid-contact, half a second after it, with commands in flight."""
     summaries = []

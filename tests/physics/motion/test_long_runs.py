@@ -102,7 +102,9 @@ def test_a_long_run_at_rest_under_load_moves_no_energy():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damping", [1e-6, 0.11])
-def test_the_books_of_a_coasting_device_close_to_1e_15_over_ten_million_steps(damping):
+@pytest.mark.parametrize(("damping", "duration"), [(1e-6, 1000.0), (0.11, 100.0)])
+def test_the_books_of_a_coasting_device_close_to_1e_15_over_ten_million_steps_or_long_after_it_stands(
+    damping, duration
+):
     device = {"mass": 0.02, "damping": damping, "velocity": 0.1}
-    assert run(scene(duration=1000.0, diverged_beyond=1e3, device=device)).relative_residual < 1e-15
+    assert run(scene(duration=duration, diverged_beyond=1e3, device=device)).relative_residual < 1e-15

@@ -5,7 +5,6 @@ They agree to 1e-11 where 1e-9 was asked for; measured is 1e-13 and less.
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ import pytest
 from haploop.launch.plan.effects import effects_of
 from haploop.launch.scene.file import load
 from haploop.protocol.scene.paths import value_at
-from haploop.protocol.scene.scene import Scene
 from helpers.runs.captured import Captured, run
 from helpers.scenes.effect_tables import slowly
 from helpers.scenes.random_scenes import drawn, is_comparable
@@ -30,12 +28,6 @@ SCENES = [
     for path in sorted((Path(__file__).parents[3] / "launch/scenes").glob("*.toml"))
     if {effect.key for effect in effects_of(load(path))} <= {*KNOWN}
 ]
-
-
-@cache
-def both(seed: int) -> tuple[Scene, Truth, Captured]:
-    scene, truth = drawn(seed)
-    return scene, truth, run(scene)
 
 
 def assert_same_motion(truth: Truth, ran: Captured) -> None:
@@ -73,7 +65,8 @@ def assert_same_books(truth: Truth, ran: Captured) -> None:
 
 @pytest.mark.parametrize("seed", [*SEEDS[::2], *slowly(SEEDS[1::2])])
 def test_every_drawn_scene_moves_decides_and_keeps_books_as_the_reference_does(seed):
-    _, truth, ran = both(seed)
+    scene, truth = drawn(seed)
+    ran = run(scene)
     assert_same_motion(truth, ran)
     assert_same_decisions(truth, ran)
     assert_same_books(truth, ran)
@@ -81,15 +74,21 @@ def test_every_drawn_scene_moves_decides_and_keeps_books_as_the_reference_does(s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("decade", range(3, 23))
-def test_two_hundred_more_drawn_scenes_do(decade):
+@pytest.mark.parametrize("decade", range(3, 13))
+def test_a_hundred_more_drawn_scenes_do(decade):
     for seed in range(10 * decade, 10 * decade + 10):
         test_every_drawn_scene_moves_decides_and_keeps_books_as_the_reference_does(seed)
-    both.cache_clear()
 
 
-@pytest.mark.parametrize("path", [*SCENES[:2], *slowly(SCENES[2:])], ids=lambda path: path.stem)
-@pytest.mark.parametrize("delay", [20, *(pytest.param(d, marks=pytest.mark.slow) for d in (0, 3, 10, 25, 50))])
+@pytest.mark.parametrize(
+    ("path", "delay"),
+    [
+        *((path, 20) for path in SCENES[:2]),
+        *(pytest.param(path, 20, marks=pytest.mark.slow) for path in SCENES[2:]),
+        *(pytest.param(path, (0, 3, 10, 25, 50)[i % 5], marks=pytest.mark.slow) for i, path in enumerate(SCENES)),
+    ],
+    ids=lambda value: value.stem if isinstance(value, Path) else None,
+)
 def test_every_shipped_scene_runs_its_whole_length_as_the_reference_does(path, delay):
     """Limit cycles with an encoder too: no decision in these runs hangs on a last bit."""
     scene = load(path, [f"clock.round_trip_delay={delay / 10_000}"])
@@ -107,7 +106,7 @@ def test_the_scenes_of_the_paper_are_among_them():
 
 @pytest.mark.slow
 def test_the_drawn_scenes_hold_everything_a_scene_can_hold():
-    scenes = [both(seed)[0] for seed in SEEDS]
+    scenes, truths = zip(*map(drawn, SEEDS), strict=True)
 
     def seen(key: str) -> set[Any]:
         return {value_at(scene, key) or False for scene in scenes}
@@ -125,5 +124,5 @@ def test_the_drawn_scenes_hold_everything_a_scene_can_hold():
     kinds = ("damping", "unidirectional-damping", "bidirectional-inertia", "unidirectional-inertia")
     assert {(e.name, e.acts) for e in elements} == {(k, a) for k in kinds for a in ("always", "in-contact")}
     assert sum(bool(scene.event) for scene in scenes) >= 8
-    contacts = [(ran.controller["in_contact"] > 0).any() for _, _, ran in map(both, SEEDS)]
+    contacts = [any(row[5] for row in truth.controller.rows) for truth in truths]
     assert sum(contacts) >= len(SEEDS) * 2 // 3
