@@ -26,7 +26,7 @@ def steady_to_run(answers: Answers, setup: Setup, kind: str) -> Interval:
 
     The size, chosen on other starts, is one of those that bear the most, the middle one of several.
     """
-    sizes = sizes_of(kind, answers.small)[:: 1 if answers.small else 2].tolist()
+    sizes = sizes_of(kind, answers.small)[:: 3 if answers.small else 2].tolist()
     bears = _climbed(answers, setup, kind, sizes, CHOSEN_BY[:1] if answers.small else CHOSEN_BY).mean(axis=1)
     there = np.flatnonzero(bears == bears.max())
     best = sizes[there[len(there) // 2]]
@@ -44,7 +44,7 @@ def _climbed(
             break
         presses = [
             Presses(setup, kind, [wall], [sizes[place] for place in part], starts)
-            for part in np.array_split(there, min(_PARTS, len(there)))
+            for part in np.array_split(there, 1 if answers.small else min(_PARTS, len(there)))
         ]
         called = answers.map_parallel(f"{kind.replace('-', ' ')} by run's word", called_steady, presses)
         rungs[there] += np.concatenate(called, axis=1)[0] & (rungs[there] == rung)
