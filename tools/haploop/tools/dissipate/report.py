@@ -94,7 +94,7 @@ def conclusion(outcome: Outcome) -> str:
 
     words = _energies(outcome.elements)
     if noisy := [element.label for element in outcome.elements if element.is_fast or element.is_moved_by_noise]:
-        words += f". Not to be relied on, since noise makes much of it: {', '.join(noisy)}"
+        words += f". Not to be relied on, since much of it or of its force is noise: {', '.join(noisy)}"
     return f"{words}."
 
 
