@@ -9,8 +9,12 @@ import numpy as np
 from haploop.plant.chain.history import ChainHistory, Interval
 from haploop.plant.chain.transition import ChainResponse
 from haploop.plant.line import Hold
+from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
+
+# For so many intervals in all.
+LOOPS = WhereItPays("haploop.plant.chain.loops", 60_000)
 
 
 class ChainMotion(ChainHistory):
@@ -37,6 +41,22 @@ class ChainMotion(ChainHistory):
     def select(self, kept: np.ndarray) -> None:
         super().select(kept)
         self._free.select(kept)
+
+
+class LoneChainMotion(ChainMotion):
+    """``ChainMotion`` of one run, by a loop of machine code where that pays."""
+
+    def __init__(self, scene: Scene, time: Timebase) -> None:
+        super().__init__(scene, time)
+        self._loops = LOOPS.module_for(time.ticks)
+        self._held = np.ascontiguousarray(self._free.held.swapaxes(0, 1))
+
+    def advance(self, tick: int, holds: list[Hold]) -> Any:
+        if not self._loops:
+            return super().advance(tick, holds)
+        interval, ends = self._begin(holds), self._loops.ends_of(tuple([count for count, _, _ in holds]))
+        self._loops.follow(self._held, self._free.of_interval(tick), interval.course, ends)
+        return self._accept(tick, interval)
 
 
 def follow(

@@ -5,12 +5,11 @@ The formulas are those of ``stick_slip`` and ``substeps`` as they stand; so are 
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from haploop.plant.chain import motion
 from haploop.plant.chain.history import StickSlipState
+from haploop.plant.chain.loops import ends_of
 from haploop.plant.friction import step_loop, stick_slip, substeps
 from haploop.plant.friction.step_loop import (
     ACTS,
@@ -224,7 +223,7 @@ class Loops:
             Their pieces, member after member; None where one switches too often for the loops: the interval is then to
             be moved by other means.
         """
-        ends = _ends_of(tuple([hold[0] for hold in holds]))
+        ends = ends_of(tuple([hold[0] for hold in holds]))
         found, pieces, begun, members = list[Pieces](), self.pieces, 0, course.shape[2]
         upto = np.empty(members, np.int64)
         while begun < members:
@@ -237,12 +236,6 @@ class Loops:
                 found.append((np.repeat(np.arange(begun, member), counts), pieces[:count].copy()))
             begun = member
         return found
-
-
-@lru_cache(maxsize=1024)
-def _ends_of(counts: tuple[int, ...]) -> np.ndarray:
-    """Returns the step at which each hold of so many steps ends."""
-    return np.cumsum(counts)
 
 
 def is_made() -> bool:

@@ -61,7 +61,7 @@ _BUILT_IN = (
         "exact",
         "exact",
         order=None,
-        motions=("haploop.plant.chain.motion:ChainMotion", "haploop.plant.friction.motion:FrictionMotion"),
+        motions=("haploop.plant.chain.motion:LoneChainMotion", "haploop.plant.friction.motion:FrictionMotion"),
     ),
     Integrator(
         "semi-implicit-euler",

@@ -33,6 +33,7 @@ from haploop.launch.scene.file import load
 from haploop.launch.spec import RunFailed
 from haploop.logger.books import segments
 from haploop.logger.session import open_session
+from haploop.plant.chain import motion as chain_motion
 from haploop.plant.friction import motion, projected
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -113,7 +114,7 @@ class Job:
 
 def _have_machine_code(is_compiled: bool) -> None:
     """Has the next run in this process use loops of machine code from its start, or none of them."""
-    for loops in (motion.LOOPS, projected.LOOPS, segments.LOOPS):
+    for loops in (chain_motion.LOOPS, motion.LOOPS, projected.LOOPS, segments.LOOPS):
         loops.asked = int(loops.pays) if is_compiled else 0
 
 
