@@ -108,7 +108,9 @@ def key_numbers(run: RunData) -> list[str]:
     words = [f"{when}: oscillation {amount(window['oscillation_m'], 'm')}"]
     if (swing_N := window.get("force_swing_N")) is not None:
         words[0] += f", force {amount(swing_N, 'N')} peak to peak"
-    if (found := run.summary.get("stability", {})).get("rate_1_s") is not None:
+    found = run.summary.get("stability", {})
+    words[:0] = [", ".join(found["provisos"])] if found.get("provisos") else []
+    if found.get("rate_1_s") is not None:
         words.append(f"pushed, it swings {swing_words(found)}")
     wall = run.wall_table_at(float(run.ticks_s[-1]))
     if wall and run.summary["verdict"] != "no-contact":

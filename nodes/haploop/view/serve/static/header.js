@@ -31,7 +31,7 @@ export function showHeader(state, phase) {
   showVerdict(state);
   const { sight } = state;
   put(byId("oscillation"), amount(sight?.oscillation_m, "m"));
-  put(byId("frequency"), amount(sight?.frequency_Hz, "Hz"));
+  put(byId("frequency"), sight?.oscillation_m || sight?.force_swing_N ? amount(sight.frequency_Hz, "Hz") : NONE);
   put(byId("ripple"), amount(sight?.force_swing_N, "N"));
   put(byId("stiffness"), stiffness(state));
   put(byId("residual"), share(state));
@@ -48,6 +48,7 @@ function showVerdict(state) {
   const known = VERDICTS.has(word) ? word : "none";
   const sought = byId("verdict");
   sought.dataset.verdict = known;
+  sought.toggleAttribute("data-proviso", isJudged(state) && !!state.summary?.stability?.provisos?.length);
   sought.dataset.is = isJudged(state) ? "judged" : (is ?? "seen");
   sought.title = (isJudged(state) ? state.verdict_rule : sight?.why) ?? "";
   put(byId("seen"), isJudged(state) ? beside(state) : is in NOT_YET ? "" : seen(sight));
@@ -55,7 +56,7 @@ function showVerdict(state) {
 }
 
 /** What has to be said in the same breath as the verdict. */
-const beside = (state) => [...(state.summary?.stability?.provisos ?? []), moved(state)].filter(Boolean).join("; ");
+const beside = (state) => state.summary?.stability?.provisos?.join(", ") || moved(state);
 
 /** What is seen still where a loop is judged steady, or not to be judged: a swing that dies away is in the picture. */
 const moved = ({ verdict, sight }) => (["steady", "undecided"].includes(verdict) && (sight?.word in SIGNS || sight?.word === "dying away") ? `last seen: ${sight.word}` : "");
