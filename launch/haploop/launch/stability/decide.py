@@ -71,6 +71,11 @@ AFTER_BLOW = {
     "swings on": " After a harder blow, of {blow_N:.3g} N, it swings on: either may come of how it is touched.",
     "undecided": " Whether it does after a harder blow, of {blow_N:.3g} N, could not be told.",
 }
+AT_HARDEST = {
+    "rests": " It does at the hand's hardest hold, {hardest_N:.3g} N, too.",
+    "swings on": " At the hand's hardest hold, {hardest_N:.3g} N, it swings on.",
+    "undecided": " Whether it does at the hand's hardest hold, {hardest_N:.3g} N, could not be told.",
+}
 FRICTIONLESS = {
     "rests": " It would without its friction, too.",
     "swings on": " Only friction holds it: without, its swing would last or grow, as one may that is wide enough.",
@@ -103,6 +108,9 @@ class Finding:
         blown: what it does after these: rests, rests off the wall, swings on, or undecided.
         frictionless: what a loop that rests, too, after these would do after the push without its friction: rests,
             swings on, or undecided; None if not asked, and of a loop without.
+        hardest_N: of a loop that rests then, too, the hardest hold that its hand came to; None if that was about the
+            last one, or the hand stays.
+        at_hardest: what it does there: rests, swings on, or undecided.
         settles_s: how long after the push it came within 5 % of where it rests; None of one that does not.
     """
 
@@ -123,6 +131,8 @@ class Finding:
     blow_N: float | None = None
     blown: str | None = None
     frictionless: str | None = None
+    hardest_N: float | None = None
+    at_hardest: str | None = None
     settles_s: float | None = None
     detail: str = ""
 
@@ -136,6 +146,12 @@ class Finding:
         blown = found.why if found.why == "rests off the wall" else _DOES.get(found.word, "undecided")
         struck = replace(self, blow_N=found.push_N, blown=blown)
         return struck if blown.startswith("rests") else replace(struck, word="undecided", why="rested")
+
+    def held_harder(self, hold_N: float, found: Finding) -> Finding:
+        """Returns the finding with what was found at a harder hold: undecided unless it rests there, too."""
+        does = _DOES.get(found.word, "undecided")
+        told = replace(self, hardest_N=abs(hold_N), at_hardest=does)
+        return told if does == "rests" else replace(told, word="undecided", why="rested")
 
     def without_friction(self, found: Finding) -> Finding:
         """Returns the finding with what was found after the same push of the loop without its friction."""
@@ -162,7 +178,7 @@ class Finding:
         """Returns what has to be said in the same breath as ``steady``."""
         holds = {
             "only friction holds it": self.frictionless == "swings on",
-            "at its last hold": HAND_MOVES in beside,
+            "at some holds of its hand": HAND_MOVES in beside,
             "its force ripples": (ripple_N or 0.0) > _RIPPLES * self.push_N,
         }
         return [proviso for proviso, holds_it in holds.items() if holds_it and self.word == "steady"]
@@ -186,6 +202,7 @@ class Finding:
         run = f"some {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
         sentence = WHY[self.why].format(**numbers, **sizes, run=run)
         sentence += AFTER_BLOW[self.blown].format(**numbers) if self.blown else ""
+        sentence += AT_HARDEST[self.at_hardest].format(**numbers) if self.at_hardest else ""
         return sentence + (FRICTIONLESS[self.frictionless] if self.frictionless else "")
 
 

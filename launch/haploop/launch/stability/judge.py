@@ -27,7 +27,7 @@ from haploop.launch.stability.looks import (
     push_of,
     watch_times,
 )
-from haploop.launch.stability.still_hand import End, StillHand, hold_of
+from haploop.launch.stability.still_hand import End, StillHand, harder_hold, hold_of
 from haploop.logger.summary import Summary, finite, write_summary
 from haploop.plant.plant import Plant
 from haploop.protocol.changes import Event, is_change
@@ -135,7 +135,8 @@ def judge(end: End, looks_s: Sequence[float] = PATIENT_S, *, frictionless: bool 
     are pushed, one ten times as hard as the other. Whatever moves a second later is the loop's own. Most loops tell
     within a second or two; slow ones are watched to the last look. It takes as long as simulating that time twice. One
     that comes to rest is struck, too, into the wall and off it, which takes as long again. Friction stops small
-    swings of an unstable loop, but wide ones not: where somebody asks, what rests is pushed without it as well.
+    swings of an unstable loop, but wide ones not: where somebody asks, what rests is pushed without it as well. A loop
+    that rests at the last hold of a hand that moves is judged at its hardest hold, too.
     """
     push_N = push_of(end.hold_N)
     pushes_N = push_N * SMALLER, push_N
@@ -147,6 +148,9 @@ def judge(end: End, looks_s: Sequence[float] = PATIENT_S, *, frictionless: bool 
     for blow in BLOWS:
         if is_struck(found):
             found = found.after_blow(_watched(end, (push_N * blow,), looks_s)[0])
+    harder_N = harder_hold(end.scene, end.time, end.plant.reached, end.hold_N) if found.word == "steady" else None
+    if harder_N is not None:
+        found = found.held_harder(harder_N, judge(replace(end, hold_N=harder_N), looks_s))
     if frictionless and is_struck(found) and end.scene.friction:
         free = replace(end, scene=replace(end.scene, friction=Friction(kinetic=0.0)))
         found = found.without_friction(_watched(free, pushes_N, LOOKS_S)[0])

@@ -23,7 +23,7 @@ from haploop.launch.stability.looks import (
     watch_times,
 )
 from haploop.launch.stability.still_batch import StillBatch
-from haploop.launch.stability.still_hand import hold_of
+from haploop.launch.stability.still_hand import harder_hold, hold_of
 from haploop.protocol.trees import tree_take
 from haploop.protocol.walls.wall import Wall
 
@@ -56,6 +56,16 @@ def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s:
             blows, _ = _watched(end, members[struck], hold_N[struck], push_N[struck] * blow, (1.0,), looks_s)
             for place, of_blow in zip(struck, blows, strict=True):
                 found[place] = found[place].after_blow(of_blow)
+    harder_N = {
+        place: harder
+        for place, each in enumerate(found)
+        if each.word == "steady"
+        and (harder := harder_hold(end.scenes[members[place]], end.time, end.tick, float(hold_N[place]))) is not None
+    }
+    if harder_N:
+        at_hardest = _judge_some(end, members[[*harder_N]], np.array([*harder_N.values()]), looks_s)
+        for (place, harder), there in zip(harder_N.items(), at_hardest, strict=True):
+            found[place] = found[place].held_harder(harder, there)
     return _with_chaos(end, members, hold_N, push_N, found, asked)
 
 

@@ -16,6 +16,12 @@ from haploop.protocol.ticks import Timebase
 
 # A push lasts this long.
 PUSH_S = 0.05
+# A force of the hand is a hold where it lasts so long; of a run that many seconds at its end are looked through.
+_HOLD_S, _LATEST_S = 0.25, 60.0
+# Kinds of force that stay where they came to.
+_STAY = ("constant", "ramp", "step", "minimum-jerk")
+# A hold that is harder by less than this is the same.
+_HARDER = 1.2
 
 
 @dataclass(frozen=True)
@@ -117,3 +123,20 @@ def hold_of(scene: Scene, time: Timebase, last: int, inside: np.ndarray) -> floa
     n = time.steps_per_tick
     force = HandForce(scene.hand.force if scene.hand else None, time.plant_rate)
     return float(force.at_steps((last - len(inside)) * n, last * n)[::n][inside].mean())
+
+
+def harder_hold(scene: Scene, time: Timebase, last: int, hold_N: float) -> float | None:
+    """Returns the hardest hold in N of a hand that moves, before tick ``last``; None where ``hold_N`` is about that.
+
+    It is the largest mean over a quarter of a second: a hand that trembles faster holds what it does on average.
+    """
+    table = scene.hand.force if scene.hand else None
+    if table is None or table.kind in _STAY:
+        return None
+    n, ticks = time.steps_per_tick, max(1, round(_HOLD_S * time.control_rate))
+    first = max(0, last - round(_LATEST_S * time.control_rate))
+    force = HandForce(table, time.plant_rate).at_steps(first * n, last * n)[::n]
+    sums = np.cumsum(np.concatenate([[0.0], force]))
+    means = (sums[ticks:] - sums[:-ticks]) / ticks
+    hardest = float(means[np.argmax(means * np.sign(hold_N))]) if len(means) else hold_N
+    return hardest if abs(hardest) > _HARDER * abs(hold_N) and hardest * hold_N > 0.0 else None
