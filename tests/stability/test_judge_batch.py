@@ -39,9 +39,9 @@ def rubbing() -> list[Scene]:
 
 
 def swaying() -> list[Scene]:
-    """Hands that sway from a hold of 0.26 N to one of 0.65 N and back, at walls of every kind."""
+    """Hands that sway from a hold of 1.15 N to one of 0.15 N, at walls of every kind."""
     return shipped(
-        "fig6b", [30.0, 150.0, 800.0, 3000.0], hand=Hand(force=Sine(amplitude=0.39, frequency=0.5, offset=-0.65))
+        "fig6b", [30.0, 150.0, 800.0, 3000.0], hand=Hand(force=Sine(amplitude=-0.5, frequency=0.75, offset=-0.65))
     )
 
 
