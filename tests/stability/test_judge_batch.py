@@ -40,9 +40,7 @@ def rubbing() -> list[Scene]:
 
 def swaying() -> list[Scene]:
     """Hands that sway from a hold of 1.15 N to one of 0.15 N, at walls of every kind."""
-    return shipped(
-        "fig6b", [30.0, 150.0, 800.0, 3000.0], hand=Hand(force=Sine(amplitude=-0.5, frequency=0.75, offset=-0.65))
-    )
+    return shipped("fig6a", [20.0, 30.0, 200.0], hand=Hand(force=Sine(amplitude=-0.5, frequency=0.75, offset=-0.65)))
 
 
 FAMILIES: dict[str, Callable[[], list[Scene]]] = {
