@@ -24,7 +24,7 @@ TWO = Best(BOTH, (1.1, 2e-3), limit(3100.0), limit(2000.0))
 FOUND = Found((ALONE, DAMPED, TWO), DAMPED, 1640.0, None, None, 10, fell=((TWO, 1530.0),), alone_N_m=910.0)
 NONE_KNOWN = Formula("K <= 2 b / T", "", "", "its source", 0.0)
 ADVICE = Advice(
-    name="mine", notes=(), is_ideal=False, tried_by="a tap", uncertain={}, not_varied=(), found=FOUND,
+    name="mine", notes=(), is_ideal=False, tried_by="a tap", uncertain={}, not_varied=(), hand=None, found=FOUND,
     formulas=(NONE_KNOWN, replace(NONE_KNOWN, stiffness_N_m=math.inf)), published=(Published(800.0, "a maker", ""),),
     described=limit(2900.0), changed=(Changed("ticks twice as often", limit(5800.0), 2.0),),
     without=(Changed("no friction", limit(127.0), 0.04), Changed("no actuator", limit(2750.0), 0.95)), assumed=(),
