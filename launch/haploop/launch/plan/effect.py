@@ -16,9 +16,9 @@ Stage = Literal["motion", "measurement", "estimate", "line", "actuation"]
 
 # Modules of the plant that effects bring. These move bodies in a row, or one under forces that change between ticks.
 HISTORY = tuple(f"haploop.plant.chain.{name}" for name in ("history", "chain", "sensed_acceleration", "transition"))
-_EXACT = ("haploop.plant.chain.motion",)
+_EXACT = ("haploop.plant.chain.motion", "haploop.plant.where_it_pays")
 CHAIN = (*_EXACT, *HISTORY)
-RUBBING = *(f"haploop.plant.friction.{name}" for name in ("motion", "substeps")), "haploop.plant.where_it_pays"
+RUBBING = tuple(f"haploop.plant.friction.{name}" for name in ("motion", "substeps"))
 # Shared by the one-step methods.
 LINEAR_RATES = ("haploop.plant.integrators.linear_rates",)
 DRAWN = ("haploop.plant.streams",)
