@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+from haploop.controller.dissipation import registry
+from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.stability.decide import Finding
 from haploop.launch.stability.judge import judge
 from haploop.launch.stability.looks import LOOKS_S
@@ -60,10 +62,28 @@ def test_the_word_for_a_hand_that_moves_is_one_of_some_holds(force, said):
     assert found(of).entries(1e-4, beside)["stability"]["provisos"] == said
 
 
-@pytest.mark.parametrize(("ripple_N", "said"), [(0.08, []), (0.12, ["its force ripples"]), (None, [])])
-def test_a_force_that_ripples_by_a_tenth_of_the_hold_is_told_beside_the_word(ripple_N, said):
-    assert Finding("steady", "rest", push_N=0.3).entries(ripple_N=ripple_N)["stability"]["provisos"] == said
-    assert not Finding("limit-cycle", "lasts", push_N=0.3).entries(ripple_N=ripple_N)["stability"]["provisos"]
+@pytest.mark.parametrize(("hold_N", "ripple_N", "is_said"), [(0.5, 0.04, False), (0.5, 0.06, True), (5.0, 0.12, True),
+                                                             (5.0, 0.08, False), (1.0, None, False)])  # fmt: skip
+def test_a_force_that_ripples_by_a_tenth_of_the_hold_or_of_a_newton_is_told_beside_the_word(hold_N, ripple_N, is_said):
+    for word, why in (("steady", "rest"), ("limit-cycle", "lasts")):
+        said = Finding(word, why, push_N=0.3 * hold_N).entries(ripple_N=ripple_N)["stability"]["provisos"]
+        assert said == ["its force ripples"] * (is_said and word == "steady")
+
+
+def test_a_loop_without_friction_that_noise_moves_by_as_much_as_a_hand_feels_says_so_beside_the_word():
+    """0.1 kg, 2 N s/m, 2 N/mm, held by 5 N: at rest without the noise of 30 µm, which moves it by 60 µm."""
+    of = scene(**pressed(
+        device={"mass": 0.1, "damping": 2.0}, wall={"position": 0.0, "stiffness": 2000.0}, encoder={"resolution": 5e-6},
+        noise={"deviation": 3e-5, "cutoff": 200.0}, hand={"force": {"kind": "constant", "value": -5.0}},
+        run={"verdict": "pushed"}))  # fmt: skip
+    summary = run_in_process(of, registry())
+    assert summary["verdict"] == "steady"
+    assert {"noise shakes it", "its force ripples"} <= {*summary["stability"]["provisos"]}
+
+
+def test_of_a_push_that_friction_withstands_it_is_said_that_nothing_moved():
+    finding = found(scene(**pressed(friction={"kinetic": 0.9})))
+    assert (finding.word, finding.why, finding.settles_s) == ("steady", "unmoved", None)
 
 
 def test_of_a_motion_too_slow_for_its_watch_no_frequency_is_told():

@@ -33,9 +33,10 @@ _TELLING_PERIODS = 7.0
 _LONGEST_S = 3600.0
 # A command that ripples by less is constant, but for rounding.
 _STILL_N = 1e-9
-# A command whose ripple is more than this share of the push, a tenth of the hold, is told of beside the word.
-_RIPPLES = 0.33
-HAND_MOVES = "the hand's motion"
+# A command whose ripple is more than this share of the push, a tenth of the hold, or this, is told of beside the word;
+# so is noise that moves the device by as much as a hand feels from 25 Hz on, peak to peak.
+_RIPPLES, _RIPPLES_N, _SHAKEN_M = 0.33, 0.1, 10e-6
+HAND_MOVES, NOISE = "the hand's motion", "noise"
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
 _COUNTS = 10
 
@@ -43,6 +44,7 @@ WHY = {
     "diverged": "The run ended by itself: {detail}.",
     "no contact": "No tick of the last half second, or of the second half of a shorter run, was in contact.",
     "rest": "After a push of {push_N:.3g} N it came to rest, to 5 % within {settles_s:.2g} s.",
+    "unmoved": "A push of {push_N:.3g} N did not move it.",
     "unfelt": "After a push of {push_N:.3g} N it came to rest within {settles_s:.2g} s but for "
     "{width_um:.3g} µm peak to peak, most at {frequency_Hz:.3g} Hz: less than a hand feels.",
     "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width_mm:.3g} mm peak to peak at "
@@ -78,7 +80,7 @@ AT_HARDEST = {
 }
 FRICTIONLESS = {
     "rests": " It would without its friction, too.",
-    "swings on": " Only friction holds it: without, its swing would last or grow, as one may that is wide enough.",
+    "swings on": " Only friction holds it: without, its swing would last or grow.",
     "undecided": " Whether it would without its friction could not be told.",
 }
 _DOES = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on", "diverged": "swings on"}
@@ -171,15 +173,17 @@ class Finding:
         # A swing that nothing else moves is the loop's own, and differs from the one after a push by chance alone.
         is_told = beside or self.word == "steady"
         numbers |= {"own_share": self.own_share(seen_m) if is_told else None, "moved_beside": [*beside]}
-        numbers["provisos"] = self._provisos(beside, ripple_N)
+        numbers["provisos"] = self._provisos(seen_m, beside, ripple_N)
         return {"verdict": self.word, "verdict_rule": self.sentence(), "stability": numbers}
 
-    def _provisos(self, beside: Sequence[str], ripple_N: float | None) -> list[str]:
+    def _provisos(self, seen_m: float | None, beside: Sequence[str], ripple_N: float | None) -> list[str]:
         """Returns what has to be said in the same breath as ``steady``."""
         holds = {
             "only friction holds it": self.frictionless == "swings on",
+            "perhaps only friction holds it": self.frictionless == "undecided",
             "at some holds of its hand": HAND_MOVES in beside,
-            "its force ripples": (ripple_N or 0.0) > _RIPPLES * self.push_N,
+            "noise shakes it": NOISE in beside and (seen_m or 0.0) > _SHAKEN_M,
+            "its force ripples": (ripple_N or 0.0) > min(_RIPPLES * self.push_N, _RIPPLES_N),
         }
         return [proviso for proviso, holds_it in holds.items() if holds_it and self.word == "steady"]
 
@@ -217,7 +221,7 @@ def decide(swing: Swing, *, last: bool) -> Finding:
         why = "rests off the wall" if swing.moved_m < REST_M else "leaves the wall"
         return Finding("undecided", why, swing.push_N, swing.watched_s)
     if swing.most_m < REST_M and swing.moved_m < _SMALL_M:
-        return _finding(swing, "steady", "rest")
+        return _finding(swing, "steady", "rest" if swing.settles_s else "unmoved")
     is_long, changes = swing.watched_s >= _LONG_S, [*zip(swing.changes, swing.errors, strict=True)]
     # Of what is too slow for its pieces all of its way counts, since they show but a part of it.
     size_m = swing.width_m if swing.covers else swing.moved_m

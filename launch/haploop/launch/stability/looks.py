@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from haploop.launch.stability.decide import HAND_MOVES, Finding, decide
+from haploop.launch.stability.decide import HAND_MOVES, NOISE, Finding, decide
 from haploop.launch.stability.swing import Pushed, measure
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -68,7 +68,7 @@ def moved_beside(scene: Scene, from_s: float) -> list[str]:
         still = getattr(force, at_rest_s[force.kind]) <= from_s
     is_noisy = scene.noise is not None or (scene.accelerometer is not None and scene.accelerometer.noise_density > 0.0)
     unmodelled = scene.hand is not None and scene.hand.kind == "unmodelled"
-    return [HAND_MOVES] * (unmodelled or not still) + ["noise"] * is_noisy
+    return [HAND_MOVES] * (unmodelled or not still) + [NOISE] * is_noisy
 
 
 def failed(push_N: float, seconds: float, detail: str) -> Finding:

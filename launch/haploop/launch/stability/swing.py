@@ -65,7 +65,8 @@ class Swing(NamedTuple):
         frequency_Hz: of the end.
         covers: whether a piece covers periods enough to tell how the swing changes, or its turns tell.
         times_felt: how strong the last quarter of either is, in terms of what is felt.
-        settles_s: time after the larger push from which on it stays within 5 % of its way, or within what remains.
+        settles_s: time after the larger push from which on it stays within 5 % of its way, or within what remains; 0 of
+            one that did not move.
     """
 
     watched_s: float
@@ -175,7 +176,7 @@ def _settling_s(x: np.ndarray, rate: float) -> np.ndarray:
     apart = np.abs(x - quarter.mean(axis=1, keepdims=True))
     within = np.maximum(_SETTLED * apart.max(axis=1), np.maximum(np.ptp(quarter, axis=1), REST_M))
     outside = apart > within[:, None]
-    return np.where(outside.any(axis=1), x.shape[1] - np.argmax(outside[:, ::-1], axis=1), 1) / rate
+    return np.where(outside.any(axis=1), x.shape[1] - np.argmax(outside[:, ::-1], axis=1), 0) / rate
 
 
 def _by_turns(swing: Swing, small_x: np.ndarray, large_x: np.ndarray, rate: float) -> Swing:
