@@ -244,6 +244,7 @@ def broken(tmp_path: Path, text: str | bytes, layout: Layout | None = None) -> s
         ("t,x\n0,\n1,\n", None, ["fewer than two samples"]),
         ("t,x\n0,0\n0.001,0.1\n0.0005,0.2\n", None, ["Line 4", "must increase", "0.0005 s follows 0.001 s"]),
         ("t,x\n0,0\n0,0.1\n0,0.2\n", None, ["do not increase", "--rate"]),
+        ("t,x\n0.002,0\n0.001,0.1\n0,0.2\n", None, ["do not increase", "sort its rows by time"]),
         ("t,x\n0,0\n0.001,much\n0.002,0\n", None, ["Line 3", "column x", "'much'"]),
         ("t,posn\n0,0\n1,1\n", Layout("position"), ["'position'", "Did you mean posn?", "There are: t, posn"]),
         ("t,y\n0,0\n1,1\n", None, ["Which column", "--position", "There are: t, y"]),

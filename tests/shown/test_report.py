@@ -41,7 +41,7 @@ def test_the_summary_table_holds_every_book_and_the_residual(swap: dict[str, Any
     window = swap["window"]
     swing, ripple = (amount(window[key], "N") for key in ("force_swing_N", "force_ripple_N"))
     assert row(text, "force  ") == [f"{swing} peak to peak at its end"]
-    assert f"{ripple} peak to peak: what is faster than 30 Hz alone" in " ".join(text.split())
+    assert f"{ripple} peak to peak, of what is faster than 30 Hz alone" in " ".join(text.split())
     assert row(text, "leak by delay") == [amount(energy["wall"]["leak"]["delay_J"], "J")]
     assert row(text, "work of the hand") == [amount(energy["hand_work_J"], "J")]
     assert row(text, "heat in the device") == [amount(energy["device_heat_J"], "J")]

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 # Words of the results, with the unit of a number.
 _WORDS = {
     "verdict": ("verdict", ""),
+    "provisos": ("provisos", ""),
     "ended": ("ended", ""),
     "logged_s": ("log ends at", "s"),
     "oscillation_m": ("oscillation at its end", "m"),

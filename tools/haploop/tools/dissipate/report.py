@@ -35,7 +35,7 @@ _NAIVE = (
 )
 _NOISY_POSITIONS = (
     "The positions have noise of about {noise}, as their fastest changes tell. As much again would change the energy "
-    "of {elements}; about as much the noise that there is has changed it."
+    "of {elements}; the noise that is in them has changed it by about as much."
 )
 _FAST_FORCE = (
     "{elements} is faster than a quarter of the sampling rate. Unless the device buzzed as fast, that is noise of the "

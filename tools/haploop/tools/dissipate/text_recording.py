@@ -20,6 +20,8 @@ _POSITIONS = ("x", "position", "pos", "position_m", "x_m", "displacement")
 # Columns that may be a force, which is read only where it is asked for: its sign and its hold are not in the file.
 _FORCES = ("force", "force_n", "f_n", "f")
 # Times without a unit are seconds by these names; by others only if they are not far apart.
+_SORT = "sort its rows by time."
+_TOO_FAST = "give the rate with --rate if samples came faster than their clock."
 _IN_SECONDS = ("time_s", "t_s", "seconds")
 _FAR_APART_S = 0.1
 # Positions without a unit are metres by these names.
@@ -132,11 +134,12 @@ class TextRecording:
         block = next(self._rows(), None)
         if block is None or len(block[0]["time"]) < 2:
             raise RecordingError(f"{self._file.path} holds fewer than two samples.")
-        period_s = float(np.median(np.diff(block[0]["time"])))
+        periods = np.diff(block[0]["time"])
+        period_s = float(np.median(periods))
         if period_s <= 0.0:
+            advice = _SORT if np.any(periods < 0.0) else _TOO_FAST
             raise RecordingError(
-                f"The times in column {self._columns['time'].name} of {self._file.path} do not increase; "
-                "give the rate with --rate if samples came faster than their clock."
+                f"The times in column {self._columns['time'].name} of {self._file.path} do not increase; {advice}"
             )
         column, times = self._columns["time"], block[0]["time"]
         has_unit = unit or column.unit or column.name.strip().lower() in _IN_SECONDS

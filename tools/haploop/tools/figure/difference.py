@@ -100,6 +100,7 @@ def _results(run: RunData) -> dict[str, Any]:
     found = summary.get("stability", {})
     return {
         "verdict": told(summary),
+        "provisos": ", ".join(found.get("provisos", ())) or None,
         "ended": summary["ended"],
         "logged_s": run.span_s[1],
         "oscillation_m": summary["window"]["oscillation_m"],

@@ -27,7 +27,7 @@ _TRIED = "a hold of {}, pushed by up to {}; haploop advise tries taps, other hol
 # Entries of the summary's window, their words, and what stands after the number. Peaks of two swings do not add.
 _OF_FORCE = {
     "force_swing_N": ("force", " peak to peak at its end"),
-    "force_ripple_N": ("force ripple", " peak to peak: what is faster than 30 Hz alone, no share of the force"),
+    "force_ripple_N": ("force ripple", " peak to peak, of what is faster than 30 Hz alone"),
 }
 # Entry of the summary, the count in it, and its words.
 _COUNTS = (
@@ -68,7 +68,7 @@ def summary_table(summary: Summary) -> RenderableType:
     from rich.text import Text
 
     word = told(summary)
-    provisos = "".join(f", {proviso}" for proviso in summary.get("stability", {}).get("provisos", ()))
+    provisos = _provisos(summary.get("stability", {}))
     head = Text.assemble((word, verdict_style(word)), (provisos, "bold yellow"), "  ", (summary["title"], "bold"))
     # Of the rule of a window the measures alone, without the limits they were held against.
     rule = summary["verdict_rule"] if "stability" in summary else summary["verdict_rule"].partition("; ")[0]
@@ -97,7 +97,7 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
         ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak at its end"),
     ]
     for key, (words, after) in _OF_FORCE.items():
-        if (force_N := window.get(key)) is not None:
+        if (force_N := window.get(key)) is not None and (force_N or key == "force_swing_N"):
             figures.append((words, amount(force_N, "N") + after))
     found = summary.get("stability", {})
     figures += _stability(found)
@@ -175,13 +175,19 @@ def _books(energy: Summary, control_rate: float) -> Table:
     return table
 
 
+def _provisos(found: Summary) -> str:
+    return "".join(f", {proviso}" for proviso in found.get("provisos", ()))
+
+
 def finding_table(finding: Finding) -> RenderableType:
     """Makes the report of a judged run: the word, why, and what it rests on."""
     from rich.console import Group
     from rich.text import Text
 
-    parts: list[RenderableType] = [Text(finding.word, style=verdict_style(finding.word)), Text(finding.sentence())]
-    if rows := _stability(finding.entries()["stability"]):
+    found = finding.entries()["stability"]
+    head = Text.assemble((finding.word, verdict_style(finding.word)), (_provisos(found), "bold yellow"))
+    parts: list[RenderableType] = [head, Text(finding.sentence())]
+    if rows := _stability(found):
         parts.append(make_facts(rows))
     return Group(*parts)
 
