@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from helpers.scenes.effect_tables import slowly
 from simulation.computer import network
 from simulation.defects import DEFECTS, put_back
 from simulation.faults import Kill, LateStart, Slow, Stop, When
@@ -50,7 +51,7 @@ def broken_in(seeds: range) -> str:
     return ""
 
 
-@pytest.mark.parametrize("part", range(2))
+@pytest.mark.parametrize("part", [0, *slowly([1])])
 def test_a_share_of_the_seeds_keeps_every_promise(part: int) -> None:
     assert broken_in(range(15 * part, 15 * part + 15)) == ""
 
@@ -138,7 +139,7 @@ def test_a_failing_history_is_told_without_the_faults_that_have_no_part_in_it() 
     assert (shortest.jumpiness, shortest.scene) == (0.0, "least")
 
 
-@pytest.mark.parametrize("defect", DEFECTS)
+@pytest.mark.parametrize("defect", [*[*DEFECTS][:3], *slowly([*DEFECTS][3:])])
 def test_every_defect_put_back_is_found_by_the_seed_that_the_page_names(defect: str) -> None:
     """Where it is not, ``python -m simulation.defects`` tells the page's seeds anew."""
     row = re.search(rf"^\| {re.escape(defect)} \| (\d+) \|$", _PAGE, re.MULTILINE)

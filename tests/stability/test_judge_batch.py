@@ -62,9 +62,8 @@ def told(result: Any) -> dict[str, Any] | None:
     return {"verdict": result["verdict"], "rule": rule, "stability": numbers}
 
 
-@pytest.mark.parametrize(
-    "family", [pytest.param(name, marks=pytest.mark.slow) if name != "plain" else name for name in FAMILIES]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("family", FAMILIES)
 def test_a_loop_judged_among_others_has_the_words_and_bits_it_has_alone(family):
     scenes, kinds = FAMILIES[family](), registry()
     batch = Batch(scenes, kinds)

@@ -36,6 +36,7 @@ def test_a_wall_beyond_its_limit_that_friction_holds_is_told_apart_from_one_that
     assert (stable.word, stable.frictionless, stable.entries()["stability"]["provisos"]) == ("steady", "rests", [])
 
 
+@pytest.mark.slow
 def test_a_wall_is_steady_that_a_blow_takes_the_device_off_where_friction_keeps_it():
     """The hold of 0.3 N does not overcome 0.4 N of friction; nothing moves after the first look."""
     finding = found(scene(**pressed(
@@ -44,6 +45,7 @@ def test_a_wall_is_steady_that_a_blow_takes_the_device_off_where_friction_keeps_
     assert (finding.word, finding.blown, finding.watched_s) == ("steady", "rests off the wall", LOOKS_S[0])
 
 
+@pytest.mark.slow
 def test_the_settling_time_is_that_of_the_second_order_loop():
     """x decays as e^(-rate t): 5 % are passed at ln(20) / rate, but for half a period (b = 3 N s/m of the device)."""
     tables = pressed(device={"mass": 0.5, "damping": 3.0}, wall={"position": 0.0, "stiffness": 300.0})
@@ -70,6 +72,7 @@ def test_a_force_that_ripples_by_a_tenth_of_the_hold_or_of_a_newton_is_told_besi
         assert said == ["its force ripples"] * (is_said and word == "steady")
 
 
+@pytest.mark.slow
 def test_a_loop_without_friction_that_noise_moves_by_as_much_as_a_hand_feels_says_so_beside_the_word():
     """0.1 kg, 2 N s/m, 2 N/mm, held by 5 N: at rest without the noise of 30 µm, which moves it by 60 µm."""
     of = scene(**pressed(
@@ -86,6 +89,7 @@ def test_of_a_push_that_friction_withstands_it_is_said_that_nothing_moved():
     assert (finding.word, finding.why, finding.settles_s) == ("steady", "unmoved", None)
 
 
+@pytest.mark.slow
 def test_of_a_motion_too_slow_for_its_watch_no_frequency_is_told():
     tables = pressed(
         device={"mass": 0.5, "damping": 0.02}, wall={"position": 0.0, "stiffness": 0.3}, diverged_beyond=100.0
@@ -109,7 +113,8 @@ SWAYING: dict[str, Any] = {
 
 
 @pytest.mark.parametrize(
-    ("stiffness", "word", "there"), [(3500.0, "undecided", "swings on"), (60.0, "steady", "rests")]
+    ("stiffness", "word", "there"),
+    [(3500.0, "undecided", "swings on"), pytest.param(60.0, "steady", "rests", marks=pytest.mark.slow)],
 )
 def test_a_wall_that_rests_at_the_lightest_hold_of_a_hand_is_steady_only_if_it_rests_at_the_hardest_too(
     stiffness, word, there

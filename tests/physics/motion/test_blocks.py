@@ -28,7 +28,7 @@ def test_blocks_and_windows_of_any_size_give_the_same_summary_of_drawn_scenes(se
 @pytest.mark.parametrize(
     ("path", "delay"),
     [
-        pytest.param(path, delay, marks=[pytest.mark.slow] * (path.stem not in ("fig6c", "swap") or delay != 13))
+        pytest.param(path, delay, marks=[pytest.mark.slow] * (path.stem != "swap" or delay != 13))
         for index, path in enumerate(SCENES)
         for delay in (13, (0, 3, 10, 20, 50)[index % 5])
     ],
