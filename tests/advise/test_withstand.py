@@ -22,7 +22,7 @@ VALUES = {NOTHING: (), DAMPING: (5.0,), BOTH: (2.0, 0.001)}
 def _pushed_walls_rest():
     with pytest.MonkeyPatch.context() as patch:
         rests = SimpleNamespace(word="steady", felt=False)
-        patch.setattr("haploop.tools.advise.withstand.judge_scene", lambda scene, kinds: rests)
+        patch.setattr("haploop.tools.advise.withstand.judge_scene", lambda scene, kinds, **named: rests)
         yield
 
 

@@ -42,6 +42,7 @@ def judge_scene(
     events: Sequence[tuple[int, Event]] | None = None,
     looks_s: Sequence[float] = PATIENT_S,
     *,
+    blows: Sequence[float] = BLOWS,
     frictionless: bool = False,
 ) -> Finding:
     """Runs a resolved scene to its end and judges that end.
@@ -51,6 +52,7 @@ def judge_scene(
         kinds: element kinds at hand.
         events: (tick, event) in order; the scene's own when None.
         looks_s: times since the push at which the loop is looked at until it tells.
+        blows: what one that rests is struck with, as shares of its push.
         frictionless: whether one that rests is pushed without its friction, too.
 
     Raises:
@@ -58,7 +60,7 @@ def judge_scene(
         ArithmeticError: the plant's arithmetic failed.
     """
     end = end_of(scene, kinds, events)
-    return judge(end, looks_s, frictionless=frictionless) if isinstance(end, End) else end
+    return judge(end, looks_s, blows=blows, frictionless=frictionless) if isinstance(end, End) else end
 
 
 def end_of(
@@ -128,7 +130,9 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
     return summary
 
 
-def judge(end: End, looks_s: Sequence[float] = PATIENT_S, *, frictionless: bool = False) -> Finding:
+def judge(
+    end: End, looks_s: Sequence[float] = PATIENT_S, *, blows: Sequence[float] = BLOWS, frictionless: bool = False
+) -> Finding:
     """Returns whether a loop forgets its start, from the end of a run in contact on.
 
     The hand is held still with the mean force of its last contacts, noise is switched off, and two copies of the loop
@@ -145,12 +149,12 @@ def judge(end: End, looks_s: Sequence[float] = PATIENT_S, *, frictionless: bool 
         beside = StillHand(end, push_N * (1.0 + BESIDE))
         beside.go_to(found.watched_s)
         return replace(found, chaotic=parts(x, beside.x, found.width_m))
-    for blow in BLOWS:
+    for blow in blows:
         if is_struck(found):
             found = found.after_blow(_watched(end, (push_N * blow,), looks_s)[0])
     harder_N = harder_hold(end.scene, end.time, end.plant.reached, end.hold_N) if found.word == "steady" else None
     if harder_N is not None:
-        found = found.held_harder(harder_N, judge(replace(end, hold_N=harder_N), looks_s))
+        found = found.held_harder(harder_N, judge(replace(end, hold_N=harder_N), looks_s, blows=blows))
     if frictionless and is_struck(found) and end.scene.friction:
         free = replace(end, scene=replace(end.scene, friction=Friction(kinetic=0.0)))
         found = found.without_friction(_watched(free, pushes_N, LOOKS_S)[0])
