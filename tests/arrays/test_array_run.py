@@ -40,7 +40,8 @@ def test_a_scene_out_of_an_array_has_every_bit_of_the_scene_alone(seed: int) -> 
     assert together(scenes) == [alone(each) for each in scenes]
 
 
-@pytest.mark.parametrize("seed", [3, *slowly([10])])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 10])
 def test_so_has_one_of_many_in_blocks_of_few_ticks(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(batch, "BLOCK", 3_000)
     rng = np.random.default_rng(seed)

@@ -26,6 +26,7 @@ def test_results_are_those_of_arrays_but_for_the_last_digits() -> None:
     assert not agree(compiled(scenes), run_batch(many(14)[1:], KINDS))
 
 
+@pytest.mark.slow
 def test_a_program_serves_all_scenes_of_its_structure_and_jax_stays_as_it_was() -> None:
     compiled(many(16))
     count = compiling()[0]

@@ -60,6 +60,7 @@ def still_swings(scene, width_m: float) -> bool:
     return bool(copy.stop_reason) or widths(copy.x[-2000:], 500).max() > 0.5 * width_m
 
 
+@pytest.mark.slow
 def test_the_rate_is_that_of_the_linear_map():
     """ln rho(M) / T within three standard errors and 2 %, for unrounded loops that decay slowly enough to see."""
     seen = 0
