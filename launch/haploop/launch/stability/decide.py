@@ -44,7 +44,7 @@ WHY = {
     "diverged": "The run ended by itself: {detail}.",
     "no contact": "No tick of the last half second, or of the second half of a shorter run, was in contact.",
     "rest": "After a push of {push_N:.3g} N it came to rest, to 5 % within {settles_s:.2g} s.",
-    "unmoved": "A push of {push_N:.3g} N did not move it.",
+    "unmoved": "After a push of {push_N:.3g} N, which did not move it, it rested.",
     "unfelt": "After a push of {push_N:.3g} N it came to rest within {settles_s:.2g} s but for "
     "{width_um:.3g} µm peak to peak, most at {frequency_Hz:.3g} Hz: less than a hand feels.",
     "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width_mm:.3g} mm peak to peak at "
