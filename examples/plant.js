@@ -62,7 +62,7 @@ function encoded(x, { resolution, rounding } = {}) {
 }
 
 take_seat("plant", async (seat) => {
-  const loop = new zmq.Router({ linger: 1000, mandatory: true, maxMessageSize: 4 * 1024 * 1024 });
+  const loop = new zmq.Router({ mandatory: true, maxMessageSize: 4 * 1024 * 1024 });
   const binds = { loop: await seat.bind(loop, "loop") };
   await seat.join(binds, { name: "plant.js", version: "1" });
   const { scene, timebase: time } = seat,

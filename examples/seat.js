@@ -32,6 +32,7 @@ const CODE = {
 };
 const NAME = Object.fromEntries(Object.entries(CODE).map(([name, code]) => [code, name]));
 const [FLUSH_MS, SAY_MS] = [10, 200];
+const LINGER_MS = 20000; // so long what was sent may still take to go out to a logger that is held up
 
 const frame = (name, ...fields) => encode([VERSION, CODE[name], ...fields]);
 // JavaScript's numbers travel as integers where they are whole, -0 as 0: numbers of the loop are written as floats
@@ -64,9 +65,9 @@ class Seat {
       answered: 0,
       told: Date.now(),
     });
-    this.clock = new zmq.Dealer({ linger: 1000 });
+    this.clock = new zmq.Dealer({ linger: LINGER_MS });
     this.telemetry = new zmq.XPublisher({
-      linger: 1000,
+      linger: LINGER_MS,
       sendHighWaterMark: 256,
       verbosity: "allSubs",
       maxMessageSize: 1024,
@@ -167,7 +168,7 @@ function take_seat(role, work) {
     }
     clearInterval(seat.timer);
     (seat.clock.close(), seat.telemetry.close());
-    setTimeout(() => process.exit(), 100); // what was sent still goes out
+    process.stdin.destroy(); // nothing is left to wait for: Node.js ends; process.exit() would drop what has not gone out
   };
   if (last.endsWith(".json"))
     return begin(fs.readFileSync(last, "utf8"), is_led(path.dirname(last)) && path.dirname(last));

@@ -8,6 +8,8 @@ VERSION = 1
 # With a port in the transport each socket has its own, in this order from that one on.
 PORTS = ("clock", "loop", "plant", "controller", "logger")
 BINDS = (zmq.ROUTER, zmq.XPUB)
+# So long what was sent may still take to go out to a logger that is held up.
+LINGER_MS = 20000
 
 
 def pack(*message):
@@ -33,7 +35,7 @@ class Sockets:
 
     def open(self, kind):
         socket = self._context.socket(kind)
-        socket.linger = 1000
+        socket.linger = LINGER_MS
         if self._keys:
             socket.curve_publickey, socket.curve_secretkey = (self._keys[key].encode() for key in ("public", "secret"))
             socket.curve_server = kind in BINDS
@@ -59,7 +61,7 @@ class Sockets:
         return socket.last_endpoint.rstrip(b"\0").decode()
 
     def close(self):
-        """Lets what was sent go out for a second, and ends everything."""
+        """Lets what was sent go out, and ends everything."""
         if self._authenticator:
             self._authenticator.stop()
-        self._context.destroy(linger=1000)
+        self._context.destroy(linger=LINGER_MS)

@@ -10,6 +10,7 @@
 #include "wire.h"
 
 enum { WIDTH = 6, MOST_ROWS = 1000, FLUSH_MS = 10, SAY_MS = 200 };
+enum { LINGER_MS = 20000 };  // so long what was sent may still take to go out to a logger that is held up
 static const char* const COLUMNS[WIDTH] = {"x", "v", "a", "wall", "total", "in_contact"};
 
 static struct {
@@ -213,8 +214,8 @@ int main(int argc, char** argv) {
   void* context = zmq_ctx_new();
   static struct frame from_clock, from_plant;
   msgpack_sbuffer_init(&refusals[0]), msgpack_sbuffer_init(&refusals[1]);
-  clock_socket = open_socket(context, ZMQ_DEALER, 1000, address);
-  telemetry = open_socket(context, ZMQ_XPUB, 1000, NULL);
+  clock_socket = open_socket(context, ZMQ_DEALER, LINGER_MS, address);
+  telemetry = open_socket(context, ZMQ_XPUB, LINGER_MS, NULL);
   int backlog = 256, verbose = 1;
   int64_t largest = 1024;
   zmq_setsockopt(telemetry, ZMQ_SNDHWM, &backlog, sizeof backlog);
