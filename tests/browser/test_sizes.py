@@ -5,7 +5,7 @@ from playwright.sync_api import expect
 
 from helpers.live.browser import DESK, IN_BOTH, PHONE, still
 from helpers.live.launched import first_and_slowly
-from helpers.live.stand_in import ENDED, RUNNING, RUNS
+from helpers.live.stand_in import ENDED, RUNNING, RUNS, SUMMARY
 from oracles.snapshots import contact
 
 TABLET, LARGE = {"width": 820, "height": 1180}, {"width": 1920, "height": 1080}
@@ -165,6 +165,22 @@ def test_on_a_phone_one_row_of_controls_floats_runs_have_the_whole_width_and_eve
         assert plot["y"] + plot["height"] - over["y"] - over["height"] > 30, chart
     stand_in.state(**ENDED)
     expect(page.locator("#to-forms")).to_be_hidden()
+
+
+def test_on_a_phone_a_title_is_read_whole_and_a_verdict_with_a_proviso_keeps_its_sign_beside_its_word(
+    stand_in, open_page
+):
+    page = shown(stand_in, open_page, PHONE, "dark")
+    assert page.evaluate("(title => title.scrollHeight <= title.clientHeight)(document.querySelector('h1'))")
+    judged = {
+        **SUMMARY,
+        "verdict": "steady",
+        "stability": {"provisos": ["by friction alone", "while the hand holds on"]},
+    }
+    stand_in.state(**ENDED | {"verdict": "steady", "summary": judged})
+    expect(page.locator("#seen")).to_have_text("by friction alone, while the hand holds on")
+    sign, word = (page.locator(f"#verdict {part}").bounding_box() for part in ("svg", "span"))
+    assert 0 < word["x"] - sign["x"] - sign["width"] < 12
 
 
 @pytest.mark.slow

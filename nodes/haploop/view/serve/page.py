@@ -1,7 +1,7 @@
 """The connection of one page: snapshots, state and events go out, its viewport and commands come in.
 
-At most two snapshots are on their way to a page that has not said yet that it drew them: a slow or hidden one costs
-nothing, and one whose answers take longer than a picture still gets every picture.
+At most four snapshots are on their way to a page that has not said yet that it drew them: a slow or hidden one costs
+nothing, and one whose answers take as long as four pictures, as beside a run that wants every core, still gets each.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _LONGEST_REASON = 120
 _FEWEST_POINTS, _MOST_POINTS = 50, 8000
 _LONGEST_S = 1e9
 # Snapshots that go out before the page has drawn them.
-_MOST_UNDRAWN = 2
+_MOST_UNDRAWN = 4
 # Commands that a page may send; the clock answers more.
 _VERBS = ("pause", "resume", "step", "stop", "swap", "set", "undo", "pace", "open", "overlay")
 # Those of them that change what is shown, and nothing in a run.

@@ -109,7 +109,7 @@ function onEvents(events) {
   redraw();
 }
 
-/** Every snapshot is a picture of its own: the server sends no third one before the first is drawn. */
+/** Every snapshot is a picture of its own: the server sends no fifth one before the first is drawn. */
 function onSnapshot(buffer) {
   if (waiting.push(buffer) === 1) requestAnimationFrame(draw);
 }
