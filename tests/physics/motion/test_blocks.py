@@ -35,11 +35,11 @@ def test_blocks_and_windows_of_any_size_give_the_same_summary_of_drawn_scenes(se
     ids=lambda value: value.stem if isinstance(value, Path) else None,
 )
 def test_blocks_of_any_size_give_the_same_summary_of_every_shipped_scene(path, delay):
-    """At 1.8 s all are in contact, and the swap is 0.3 s past."""
+    """At 1.8 s all are in contact, and the swap is 0.3 s past. Each size is tried of every scene, not at each delay."""
     scene = load(path, [f"clock.round_trip_delay={delay / 10_000}"])
     scene = replace(scene, duration=min(scene.duration, 1.8))
     usual = in_blocks(scene, 100)
-    for block_ticks in (1, 7, 1000):
+    for block_ticks in (1, 1000) if delay == 13 else (7,):
         assert in_blocks(scene, block_ticks) == usual
 
 

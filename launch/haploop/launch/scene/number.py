@@ -170,7 +170,12 @@ _UNITS = {
     prefix + name: (exponents, Decimal(1).scaleb(power + own))
     for name, (exponents, own) in _PREFIXED.items()
     for prefix, power in _PREFIXES.items()
-} | {"%": ((0, 0, 0, 0), Decimal("0.01")), "min": ((0, 0, 1, 0), Decimal(60))}
+} | {
+    "%": ((0, 0, 0, 0), Decimal("0.01")),
+    "min": ((0, 0, 1, 0), Decimal(60)),
+    "deg": ((0, 0, 0, 1), Decimal("0.01745329251994329576923690768")),
+    "g_0": ((0, 1, -2, 0), Decimal("9.80665")),
+}
 _DIMENSIONS = {"[length]": 1, "[mass]": 0, "[time]": 2}
 _RAISED = str.maketrans({"\u207b": "^-", "\u00b9": "^1", "\u00b2": "^2", "\u00b3": "^3", "\u2074": "^4"})
 _PARTS = re.compile(r"([\s*/·]*)([^\W\d]\w*|%)(?:(?:\*\*|\^)(-?[\d.]+))?")
