@@ -150,10 +150,12 @@ print(status["VmHWM"].split()[0], file=sys.stderr)
 @pytest.mark.slow
 @pytest.mark.parametrize("to", FORMATS)
 def test_a_longer_log_takes_no_more_memory(to: str, tmp_path: Path) -> None:
-    """Its columns are 61 MB more and may cost half of that: the whole process is measured, 16 MB of it chance."""
+    """Its columns are 61 MB more and may cost half of that: the whole process is measured, 16 MB of it chance.
+    Text takes long to write, and chance is little there: logs of a third."""
     needs(to)
+    sizes, more_kb = ((20_000, 70_000), 10_000) if to in ("csv", "json-mcap") else ((60_000, 200_000), 30_000)
     held_kb = []
-    for ticks in (60_000, 200_000):
+    for ticks in sizes:
         run = swapped_run(tmp_path / str(ticks), ticks, hard=False, flush_ticks=1000)
         out = tmp_path / f"exported-{ticks}"
         out.mkdir()
@@ -163,4 +165,4 @@ def test_a_longer_log_takes_no_more_memory(to: str, tmp_path: Path) -> None:
         ended = subprocess.run(measured, capture_output=True, text=True, check=True, env=plainly)
         held_kb.append(int(ended.stderr.split()[-1]))
     print(f"{to}: {held_kb} kB")
-    assert held_kb[1] < held_kb[0] + 30_000
+    assert held_kb[1] < held_kb[0] + more_kb
