@@ -61,14 +61,18 @@ class Case:
         """The case in words: ``hold x 3, doubled: cable stiffness; 20 % less: friction, device mass``."""
         return ", ".join([f"hold x {self.hold:.2g}", *([told] if (told := corner_words(self.corner)) else [])])
 
-    def scene(self, loop: Scene) -> Scene:
-        """Returns the scene of this case, with a wall of 1 N/m, made of a loop of ``make_loop``."""
+    def scene(self, loop: Scene, slow: float | None = None) -> Scene:
+        """Returns the scene of this case, with a wall of 1 N/m, made of a loop of ``make_loop``.
+
+        ``slow`` is the loop's slowness, where it is known.
+        """
         scene, mean_N = scale_quantities(loop, dict(self.corner)), -self.hold * hold_N(loop)
-        frequency_Hz = self.sway_Hz / slowness(loop)
+        slow = slow or slowness(loop)
+        frequency_Hz = self.sway_Hz / slow
         force = Sine(amplitude=self.sway * mean_N, frequency=frequency_Hz, offset=mean_N)
         return replace(
             scene,
-            duration=math.ceil(slowness(loop) * LASTS_S),
+            duration=math.ceil(slow * LASTS_S),
             device=replace(scene.device, position=2e-4, velocity=-self.tap_m_s),
             hand=replace(scene.hand or Hand(), rest=0.0, force=force),
             wall=Wall(position=0.0, stiffness=1.0),

@@ -43,7 +43,7 @@ class Buzz(NamedTuple):
 
 def felt_m(frequency_Hz: np.ndarray) -> np.ndarray:
     """Returns the narrowest swing that is felt, peak to peak, m (Israr, Choi and Tan 2006)."""
-    return 2.0 * np.vectorize(smallest_felt_m, otypes=[float])(frequency_Hz)
+    return 2.0 * smallest_felt_m(frequency_Hz)
 
 
 def felt_force_N(scene: Scene) -> Threshold:

@@ -22,6 +22,8 @@ from haploop.protocol.ticks import Timebase
 Kinds = Mapping[str, type[Element]]
 # Elements without a memory and their parameter, of which 0 is no element: walls with any of them move as one array.
 _PLAIN = {"damping": "damping", "bidirectional-inertia": "mass", "unidirectional-inertia": "mass"}
+# Of a scene, what no motion of bodies depends on.
+_OF_A_WALL = ("title", "seed", "wall", "dissipation")
 
 
 class Seen(NamedTuple):
@@ -105,8 +107,12 @@ def is_plain(elements: Sequence[ElementTable]) -> bool:
 def make_loops(scenes: Sequence[Scene], kinds: Kinds) -> list[tuple[list[int], Loops | LoneLoop]]:
     """Returns the indices of the scenes that move together, with their loops."""
     groups: dict[Any, list[int]] = {}
+    known: dict[tuple[int, ...], bool] = {}  # by the parts of a scene: walls that are tried in one case share them
     for index, shape in enumerate(structures([_shape(scene) for scene in scenes])):
-        smooth = is_batchable(replace(scenes[index], friction=None))
+        bodies = tuple(id(part) for key, part in vars(scenes[index]).items() if key not in _OF_A_WALL)
+        if bodies not in known:
+            known[bodies] = is_batchable(replace(scenes[index], friction=None))
+        smooth = known[bodies]
         groups.setdefault((shape, scenes[index].friction is None) if smooth else index, []).append(index)
     return [(group, LoneLoop(scenes[key], kinds) if isinstance(key, int) else Loops([scenes[i] for i in group], kinds))
             for key, group in groups.items()]  # fmt: skip

@@ -92,10 +92,11 @@ class Trial:
 
 
 def run_jobs(jobs: Sequence[Job]) -> list[Failure | None]:
-    """Tries one wall of each job in all its cases, with loops that last equally long.
+    """Tries one wall of each job in all its cases, with loops that are equally slow.
 
     A wall that fails leaves the arrays with all its cases.
     """
+    slow = slowness(jobs[0].loop)
     made: dict[tuple[int, Case], Scene] = {}
     members = [(index, place) for index, job in enumerate(jobs) for place in range(len(job.cases))]
     scenes: list[Scene] = []
@@ -103,7 +104,7 @@ def run_jobs(jobs: Sequence[Job]) -> list[Failure | None]:
         job = jobs[index]
         [wall], case = job.walls, job.cases[place]
         if (id(job.loop), case) not in made:
-            made[id(job.loop), case] = case.scene(job.loop)
+            made[id(job.loop), case] = case.scene(job.loop, slow)
         held = Wall(position=0.0, stiffness=float(wall.stiffness_N_m))
         seed = job.loop.seed + place
         scenes.append(replace(made[id(job.loop), case], seed=seed, wall=held, dissipation=wall.elements))
@@ -113,7 +114,7 @@ def run_jobs(jobs: Sequence[Job]) -> list[Failure | None]:
     thresholds = {of: felt_force_N(loop) for of, loop in felt.items()}
     for group, loops in make_loops(scenes, installed_kinds()):
         _watch(jobs, loops, [members[index] for index in group], failed, touched, thresholds)
-    from_s = FROM_S * slowness(jobs[0].loop)
+    from_s = FROM_S * slow
     untold = Failure(_NO_CONTACT.format(from_s), from_s, gone=False)
     return [failed.get(index, None if index in touched else untold) for index in range(len(jobs))]
 
