@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from haploop.tools.advise.advice import Advice, Changed
-from haploop.tools.advise.families import BOTH, DAMPING, NOTHING
+from haploop.tools.advise.families import BOTH, DAMPING, NOTHING, UNIDIRECTIONAL
 from haploop.tools.advise.figure import figure_of
 from haploop.tools.advise.known import Formula, Published
 from haploop.tools.advise.search import Found
@@ -21,7 +21,8 @@ def limit(stiffness_N_m: float) -> Limit:
 ALONE = Best(NOTHING, (), limit(2100.0))
 DAMPED = Best(DAMPING, (1.1,), limit(2900.0), limit(1700.0))
 TWO = Best(BOTH, (1.1, 2e-3), limit(3100.0), limit(2000.0))
-FOUND = Found((ALONE, DAMPED, TWO), DAMPED, 1640.0, None, None, 10, fell=((TWO, 1530.0),), alone_N_m=910.0)
+ONE = Best(UNIDIRECTIONAL, (2e-3,), limit(2700.0), limit(1800.0))
+FOUND = Found((ALONE, DAMPED, TWO, ONE), DAMPED, 1640.0, None, None, 10, fell=((TWO, 1530.0),), alone_N_m=910.0)
 NONE_KNOWN = Formula("K <= 2 b / T", "", "", "its source", 0.0)
 ADVICE = Advice(
     name="mine", notes=(), is_ideal=False, tried_by="a tap", uncertain={}, not_varied=(), hand=None, found=FOUND,
@@ -41,15 +42,29 @@ def beside(ax, row):
     return [text.get_text() for text in ax.texts if text.xy[1] == row]
 
 
-def test_what_holds_in_every_corner_stands_beside_what_holds_as_described(panels):
+def test_what_withstood_the_attack_stands_beside_what_holds_in_every_corner_and_as_described(panels):
     walls, changes = panels
-    assert beside(walls, 0) == ["0.91 N/mm", "2.1 N/mm"]
-    assert beside(walls, 1) == ["1.64 N/mm", "2.9 N/mm"]
-    assert beside(walls, 2) == ["below 1.53 N/mm", "3.1 N/mm"], (
+    assert beside(walls, 0) == ["0.91 N/mm", "–", "2.1 N/mm"]
+    assert beside(walls, 1) == ["1.64 N/mm", "1.7 N/mm", "2.9 N/mm"]
+    assert beside(walls, 2) == ["below 1.53 N/mm", "2.0 N/mm", "3.1 N/mm"], (
         "the wall at which the attack broke it is not one it bears"
     )
-    assert [beside(walls, row)[1] for row in (3, 4, 5)] == ["0 N/mm", "any", "0.80 N/mm"]
-    assert [beside(changes, row)[1] for row in range(3)] == ["5.8 N/mm", "0.13 N/mm", "2.8 N/mm"]
+    assert [beside(walls, row)[2] for row in (4, 5, 6)] == ["0 N/mm", "any", "0.80 N/mm"]
+    assert [beside(changes, row)[2] for row in range(3)] == ["5.8 N/mm", "0.13 N/mm", "2.8 N/mm"]
+
+
+def test_an_element_that_was_not_attacked_has_no_number_there_however_much_it_bears_in_the_corners(panels):
+    assert beside(panels[0], 3) == ["–", "1.8 N/mm", "2.7 N/mm"]
+
+
+def test_a_wall_far_softer_than_the_others_is_an_arrow_at_the_end_of_the_axis_and_does_not_stretch_it():
+    soft = replace(ADVICE, without=(Changed("no friction", limit(2.0), 0.0007),))
+    walls, changes = figure_of(soft).get_axes()
+    assert changes.get_xlim() == walls.get_xlim() == (0.02, 10.0)
+    assert beside(changes, 1) == ["", "", "2.0 N/m"]
+    arrows = [line for line in changes.lines if line.get_marker() == "<"]
+    assert [list(line.get_xdata()) for line in arrows] == [[0.02]]
+    assert list(walls.get_xlim()) == [0.02, 10.0]
 
 
 def test_both_panels_have_one_axis_from_and_to_round_numbers_and_no_bar_whose_length_would_mean_nothing(panels):
@@ -59,5 +74,5 @@ def test_both_panels_have_one_axis_from_and_to_round_numbers_and_no_bar_whose_le
 
 def test_every_kind_of_mark_is_in_a_legend(panels):
     walls, changes = ([text.get_text() for text in ax.get_legend().get_texts()] for ax in panels)
-    assert walls == ["as described", "in every corner", "formula", "published"]
+    assert walls == ["as described", "in every corner", "attacked", "formula", "published"]
     assert set(changes) == {"stiffer", "softer", "as stiff within a tenth", "as described"}

@@ -41,10 +41,11 @@ FELL = "With {0} walls of {1} bear every corner at three holds; at more holds an
 NO_OTHER = "None of these bears {0:.2g} N/mm in the loop as described, at seven parameters each: {1}."
 READING = (
     "Every corner: what is uncertain 20 % more or less, what is assumed half or twice, in all combinations, or 32 of "
-    "more; a dash where an element allows no tenth more than the wall alone; * where stiffer walls bear what a softer "
-    "one does not. Changes and assumptions: of the loop as described, with the element advised or with none, "
-    "whichever bears more. All these at holds of 0.3, 1 and 3 times the task's; the first line, at more holds and "
-    "under attack, may be lower."
+    "more, at holds of 0.3, 1 and 3 times the task's; a dash where an element allows no tenth more than the wall "
+    "alone. Attacked: at all holds, sways and approaches, as the first line; a dash where that was not tried, since "
+    "another bears more, or nearly as much with fewer elements. * where stiffer walls bear what a softer one does "
+    "not. Changes and assumptions: of the loop as described, with the element advised or with none, whichever bears "
+    "more, at the three holds."
 )
 SAFE_MEANS = (
     "at rest, or swinging by less than a hand feels, in position (Israr, Choi and Tan 2006) and in force (what would "

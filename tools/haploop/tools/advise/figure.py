@@ -7,8 +7,10 @@ import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from haploop.tools.advise.advice import Advice
-from haploop.tools.advise.report import format_limit, format_stiffness, moves, sentences
+from haploop.tools.advise.report import format_attacked, format_limit, format_stiffness, moves, sentences
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.withstand import WORTH
 from haploop.tools.figure import style
@@ -20,11 +22,13 @@ if TYPE_CHECKING:
 _WIDTH_IN, _ROW_IN, _BESIDE_IN = 11.0, 0.37, 1.6
 _LETTERS = 118
 _DOT = 7.0
-_LIGHT, _SOFTER = "white", "#B07A45"
+_LIGHT, _HALF, _SOFTER = "white", "#9CC3E0", "#B07A45"
 # Right ends of the columns of numbers beside the axes, in points.
-_COLUMNS = 90, 175
+_COLUMNS = 85, 155, 230
 # Numbers at which an axis may begin and end, in every decade.
 _ENDS = (1.0, 2.0, 5.0)
+# An axis goes no further down from the stiffest wall; what is softer stands at its end, as an arrow.
+_SPAN = 300.0
 
 
 def draw(told: Advice, target: Path) -> Path:
@@ -55,24 +59,25 @@ def figure_of(told: Advice) -> Figure:
         ax.set_xlim(*_ends([value / 1e3 for values in stiffnesses for value in values]))
         ax.set_xscale("log")
         style.plain_numbers(ax.xaxis)
+        _keep_within(ax)
     return figure
 
 
 def _walls(ax: Axes, told: Advice, lines: list[str]) -> list[float]:
     """Marks the loop as described, every corner, and what is known; returns the stiffnesses, N/m."""
-    found, names, marked = told.found, [], []
-    for row, best in enumerate(found.bests):
-        is_advised, nominal = best is found.advised, best.nominal.stiffness_N_m
-        safe = found.stiffness_N_m if is_advised else best.safe.stiffness_N_m if best.safe else 0.0
-        safe = safe if best.values else found.alone_N_m
-        fails = min((below for fallen, below in found.fell if fallen.family is best.family), default=math.inf)
-        fell, safe = fails <= safe, min(safe, fails)
-        ends = [end for end in (safe, nominal) if end]
-        ax.plot([end / 1e3 for end in ends], [row] * len(ends), color=style.WALL, linewidth=1.0, zorder=2)
+    names, marked = [], []
+    for row, best in enumerate(told.found.bests):
+        nominal, safe = best.nominal.stiffness_N_m, best.safe.stiffness_N_m if best.safe else 0.0
+        attacked, withstood = told.found.attacked(best) or (0.0, True)
+        ends = [end for end in (attacked, safe, nominal) if end]
+        ax.plot([min(ends) / 1e3, max(ends) / 1e3] if ends else [], [row, row] if ends else [], color=style.WALL,
+                linewidth=1.0, zorder=2)  # fmt: skip
         _mark(ax, row, nominal, "o", style.WALL, "" if row else "as described", face=_LIGHT)
-        _mark(ax, row, safe, "<" if fell else "o", style.WALL, "" if row else "in every corner")
-        numbers = ("below " * fell + format_stiffness(safe) if safe else "–"), format_limit(best.nominal)
-        _beside(ax, row, numbers, is_advised)
+        _mark(ax, row, safe, "o", style.WALL, "" if row else "in every corner", face=_HALF)
+        _mark(ax, row, attacked, "o" if withstood else "<", style.WALL, "" if row else "attacked")
+        safe_words = format_limit(best.safe) if best.safe else "–"
+        numbers = format_attacked(told, best), safe_words, format_limit(best.nominal)
+        _beside(ax, row, numbers, best is told.found.advised)
         names.append(f"{best.family.name}\n{best.family.words(best.values)}" if best.values else best.family.name)
         marked += ends
     formulas = [(f"{row.formula} ({row.source})", row.stiffness_N_m) for row in told.formulas]
@@ -81,12 +86,12 @@ def _walls(ax: Axes, told: Advice, lines: list[str]) -> list[float]:
         for place, (name, stiffness) in enumerate(known):
             drawn = stiffness if stiffness < 1e9 else 0.0
             _mark(ax, len(names), drawn, "D", colour, "" if place else label)
-            _beside(ax, len(names), ("", format_stiffness(stiffness)))
+            _beside(ax, len(names), ("", "", format_stiffness(stiffness)))
             names.append(name)
             marked.append(drawn)
     title = f"{told.name}: upper bound, not advice" if told.is_ideal else f"{told.name}: how stiff a wall may be"
     _finish(ax, title, names, lines)
-    _beside(ax, -0.85, ("in every corner", "as described"), bold=True)
+    _beside(ax, -0.85, ("attacked", "every corner", "as described"), bold=True)
     return marked
 
 
@@ -105,7 +110,7 @@ def _changes(ax: Axes, told: Advice, others: list[tuple[str, Limit]]) -> list[fl
             ax.plot([nominal / 1e3, stiffness / 1e3], [row, row], color=colour, linewidth=2.0)
         _mark(ax, row, stiffness, "o", colour, "" if label in seen or not stiffness else label)
         seen |= {label} if stiffness else set()
-        _beside(ax, row, ("", format_limit(limit)))
+        _beside(ax, row, ("", "", format_limit(limit)))
     if nominal:
         ax.axvline(nominal / 1e3, color=style.INK, linewidth=1.2, label="as described", zorder=1)
     _finish(ax, "the same loop as described, with one change of the device", [name for name, _ in others], [])
@@ -120,7 +125,7 @@ def _mark(ax: Axes, row: int, stiffness: float, shape: str, colour: str, label: 
         ax.plot(*at, shape, label=label or "_", zorder=3, **look)
 
 
-def _beside(ax: Axes, row: float, numbers: tuple[str, str], bold: bool = False) -> None:
+def _beside(ax: Axes, row: float, numbers: tuple[str, str, str], bold: bool = False) -> None:
     """Writes a row of the table beside the axes."""
     look = {"fontsize": style.SMALL, "color": style.INK, "fontweight": "bold" if bold else "normal", "va": "center"}
     for right, text in zip(_COLUMNS, numbers, strict=True):
@@ -131,10 +136,22 @@ def _beside(ax: Axes, row: float, numbers: tuple[str, str], bold: bool = False) 
 def _ends(stiffnesses: list[float]) -> tuple[float, float]:
     """Returns the round numbers around the positive ones, 1, 2 or 5 in a decade, for a logarithmic axis."""
     real = [value for value in stiffnesses if value > 0.0] or [1.0]
-    least, most = min(real) * 0.9, max(real) * 1.1
+    most = max(real) * 1.1
+    least = max(min(real) * 0.9, most / _SPAN)
     decades = range(math.floor(math.log10(least)) - 1, math.ceil(math.log10(most)) + 2)
     steps = [digit * 10.0**power for power in decades for digit in _ENDS]
     return max(step for step in steps if step <= least), min(step for step in steps if step >= most)
+
+
+def _keep_within(ax: Axes) -> None:
+    """Moves what lies beyond the soft end of the axis to that end, marks as arrows."""
+    end = ax.get_xlim()[0]
+    for line in ax.lines:
+        at = np.asarray(line.get_xdata(), float).tolist()
+        if at and min(at) < end:
+            line.set_xdata([max(x, end) for x in at])
+            if len(at) == 1:
+                line.set(marker="<", clip_on=False)
 
 
 def _finish(ax: Axes, title: str, names: list[str], lines: list[str]) -> None:
@@ -146,4 +163,4 @@ def _finish(ax: Axes, title: str, names: list[str], lines: list[str]) -> None:
     ax.grid(axis="y", visible=False)
     text = "\n".join(["wall stiffness, N/mm", *lines])
     ax.set_xlabel(text, loc="left", fontsize=style.TEXT, color=style.GREY, linespacing=1.5)
-    style.legend(ax, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4)
+    style.legend(ax, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5)

@@ -54,7 +54,7 @@ def formulas(loop: Scene) -> list[Formula]:
             limit = OneTickMap.from_scene(smooth, kinds).stiffness_limit()
         except NeverStable:
             limit = 0.0
-        found.append(Formula("rho(M) = 1", "exact map of a tick", "grows, but for encoder and friction",
+        found.append(Formula("rho(M) = 1", "exact map of a tick, no element", "grows, but for encoder and friction",
                              "this loop, linear", limit))  # fmt: skip
     return found
 

@@ -119,14 +119,22 @@ def moves(half: Limit, double: Limit, nominal: Limit) -> bool:
 
 
 def _elements(told: Advice) -> Table:
-    heads = f"as described\nto {ROUGH * 100:.0f} %", f"every corner\nto {CLOSE * 100:.0f} %"
+    heads = f"as described\nto {ROUGH * 100:.0f} %", f"every corner\nto {CLOSE * 100:.0f} %", "attacked"
     table = make_table("element", "parameter", *heads, numbers=heads)
     for best in told.found.bests:
         is_advised = best is told.found.advised
         safe = format_limit(best.safe) if best.safe else "–"
         row = (best.family.name, best.family.words(best.values), format_limit(best.nominal) + _island(best), safe)
-        table.add_row(*row, style="bold" if is_advised else "")
+        table.add_row(*row, format_attacked(told, best), style="bold" if is_advised else "")
     return table
+
+
+def format_attacked(told: Advice, best: Best) -> str:
+    """Formats the wall that withstood the attack with an element, or that did not; a dash where none was attacked."""
+    if not (found := told.found.attacked(best)):
+        return "–"
+    stiffness_N_m, withstood = found
+    return ("" if withstood else "below ") + (format_stiffness(stiffness_N_m) if stiffness_N_m else "none")
 
 
 def _island(best: Best) -> str:

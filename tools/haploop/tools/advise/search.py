@@ -63,6 +63,18 @@ class Found:
     fell: tuple[tuple[Best, float], ...] = ()
     alone_N_m: float = 0.0
 
+    def attacked(self, best: Best) -> tuple[float, bool] | None:
+        """Returns the wall, N/m, of one of ``bests`` that withstood the attack, and True, or the softest that did not.
+
+        None where it was not attacked, since another bears more, or as much with fewer elements.
+        """
+        if best is self.advised:
+            return self.stiffness_N_m, True
+        if best.family is NOTHING:
+            return self.alone_N_m, True
+        below = [stiffness_N_m for fallen, stiffness_N_m in self.fell if fallen.family is best.family]
+        return (min(below), False) if below else None
+
 
 def search(
     loop: Scene, assumed: Sequence[str], trial: Trial, stage: Callable[[str], object] = lambda name: None
