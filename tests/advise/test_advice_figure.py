@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from haploop.tools.advise.advice import Advice, Changed
@@ -63,7 +64,7 @@ def test_a_wall_far_softer_than_the_others_is_an_arrow_at_the_end_of_the_axis_an
     assert changes.get_xlim() == walls.get_xlim() == (0.02, 10.0)
     assert beside(changes, 1) == ["", "", "2.0 N/m"]
     arrows = [line for line in changes.lines if line.get_marker() == "<"]
-    assert [list(line.get_xdata()) for line in arrows] == [[0.02]]
+    assert [np.asarray(line.get_xdata()).tolist() for line in arrows] == [[0.02]]
     assert list(walls.get_xlim()) == [0.02, 10.0]
 
 

@@ -11,10 +11,12 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from haploop.launch.runs.loaded_scene import load
+from haploop.launch.runs.result import Result
 from haploop.launch.scene.bundled import bundled
 from haploop.tools.cli.app import app
 from haploop.tools.demo.report import report
 from haploop.tools.demo.story import Part, Story
+from haploop.tools.figure import style
 
 SCENE = load(bundled("scenes")["demo"]).scene
 
@@ -45,6 +47,20 @@ def test_the_demo_says_steady_of_the_element_only_where_the_verdict_does() -> No
             said = story(part(before), part(after)).outcome()
             assert ("not steady" in said or "it is not with it" in said) == (after != "steady"), said
             assert ("was steady before" in said) == (before == "steady"), said
+
+
+def test_what_a_steady_loop_rests_on_stands_in_the_demo_s_sentence_in_its_colour_and_in_a_result_s_repr() -> None:
+    held, free = part("steady"), part("steady")
+    held.summary["stability"]["provisos"] = ["only friction holds it"]
+    told = story(part("limit-cycle"), held).outcome()
+    assert told == "With damping of 5 N s/m the same wall is steady. Yet: only friction holds it."
+    assert "Yet" not in story(part("limit-cycle"), free).outcome()
+    assert style.verdict_colour(held.summary) != style.verdict_colour(free.summary) == style.VERDICTS["steady"]
+    about = {"title": "mine", "duration_s": 1.0, "window": {"oscillation_m": 0.0}}
+    scene: Any = SCENE
+    results = [Result(scene, of.summary | about, None) for of in (held, free)]
+    assert [result.provisos for result in results] == [("only friction holds it",), ()]
+    assert [repr(result).partition(": ")[0] for result in results] == ["<steady, only friction holds it", "<steady"]
 
 
 def test_the_demo_says_why_of_the_time_before_the_swap() -> None:

@@ -6,7 +6,7 @@ A wall is run, and another one steered while it runs:
 
     scene = load("demo", {"wall.stiffness": "3 N/mm"})      # a file of yours, or a name that `haploop scenes` lists
     result = run(scene)                                     # in this process, in memory; the bits of `haploop run`
-    result.verdict, result.quantity("window.oscillation_m")
+    result.verdict, result.provisos, result.quantity("window.oscillation_m")
     result["/plant"]["x"], result["/plant"].units["x"]      # a NumPy array, and its unit
 
     with start(scene, paused=True) as loop:                 # plant, controller and logger as processes, steered

@@ -76,6 +76,11 @@ class Result:
         """``steady``, ``limit-cycle``, ``growing``, ``diverged``, ``no-contact`` or ``undecided``."""
         return self.summary["verdict"]
 
+    @property
+    def provisos(self) -> tuple[str, ...]:
+        """What a verdict of ``steady`` rests on, in words: ``only friction holds it``; empty where on nothing."""
+        return tuple(self.summary.get("stability", {}).get("provisos", ()))
+
     def quantity(self, key: str) -> pint.Quantity[float]:
         """A number of the summary with its unit, by dotted key: ``"window.oscillation_m"``, ``"energy.moved_J"``.
 
@@ -95,7 +100,8 @@ class Result:
     def __repr__(self) -> str:
         swing_mm = 1e3 * (self.summary["window"]["oscillation_m"] or 0.0)
         title, duration_s = self.summary["title"], self.summary["duration_s"]
-        return f"<{self.verdict}: {title!r}, {duration_s:g} s, oscillation {swing_mm:.3g} mm peak to peak>"
+        word = ", ".join([self.verdict, *self.provisos])
+        return f"<{word}: {title!r}, {duration_s:g} s, oscillation {swing_mm:.3g} mm peak to peak>"
 
 
 def run(

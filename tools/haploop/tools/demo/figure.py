@@ -65,7 +65,7 @@ def _name_parts(ax: Axes, story: Story) -> None:
     first, last = story.data.span_s
     share = (story.at_s - first) / (last - first)
     for part, x in ((story.before, 0.5 * share), (story.after, 0.5 + 0.5 * share)):
-        colour = style.VERDICTS.get(part.verdict, style.GREY)
+        colour = style.verdict_colour(part.summary)
         box = {"boxstyle": "round,pad=0.3", "facecolor": colour, "linewidth": 0}
         look = {"color": "white", "fontweight": "bold", "fontsize": style.TEXT + 1, "ha": "center", "va": "top"}
         ax.text(x, 0.95, part.verdict, transform=ax.transAxes, bbox=box, gid="verdict", **look)
@@ -79,9 +79,9 @@ def _draw_loop(ax: Axes, story: Story, part: Part, end_s: float, name: str) -> N
     style.dress(ax, title, _PENETRATION if part.frequency_Hz else "penetration (mm)", "force out of the wall (N)")
     spring = np.array([0.0, depth.max(initial=0.0)])
     ax.plot(spring * MM, stiffness * spring, color=style.INK, linewidth=1.0, dashes=(4, 2), label="ideal spring")
-    ax.plot(depth * MM, force, color=style.VERDICTS.get(part.verdict, style.GREY), linewidth=1.3, label="held force")
+    ax.plot(depth * MM, force, color=style.verdict_colour(part.summary), linewidth=1.3, label="held force")
     if np.ptp(depth) * MM < 1e-3 and len(depth):
-        ax.plot(depth[-1:] * MM, force[-1:], "o", color=style.VERDICTS.get(part.verdict, style.GREY), markersize=7)
+        ax.plot(depth[-1:] * MM, force[-1:], "o", color=style.verdict_colour(part.summary), markersize=7)
     style.corner_legend(ax)
 
 

@@ -45,6 +45,11 @@ class Part:
         return self.summary["verdict"]
 
     @property
+    def provisos(self) -> list[str]:
+        """What the verdict rests on."""
+        return self.summary.get("stability", {}).get("provisos", [])
+
+    @property
     def frequency_Hz(self) -> float | None:
         """Frequency of the swing that remains; None where none does, or the loop was not judged."""
         found: dict[str, Any] = self.summary.get("stability", {})
@@ -55,7 +60,7 @@ class Part:
         """Returns name and value of what there is to compare."""
         return [
             ("verdict", self.verdict),
-            ("proviso", "; ".join(self.summary.get("stability", {}).get("provisos", ())) or "–"),
+            ("proviso", "; ".join(self.provisos) or "–"),
             ("position swings by", amount(self.swing_m, "m")),
             ("force swings by", amount(self.force_swing_N, "N")),
             ("at", amount(self.frequency_Hz, "Hz")),
@@ -89,7 +94,8 @@ class Story:
     def outcome(self) -> str:
         """Returns what the swap did, as a sentence."""
         steady = self.before.verdict == "steady", self.after.verdict == "steady"
-        return OUTCOME[steady].format(element=self.element)
+        provisos = f" Yet: {', '.join(self.after.provisos)}." if self.after.provisos else ""
+        return OUTCOME[steady].format(element=self.element) + provisos
 
 
 def tell(spec: RunSpec) -> Story:

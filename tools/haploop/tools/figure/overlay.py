@@ -112,7 +112,7 @@ def _head(header: Figure | SubFigure, run: RunData, label: str, y: float, colour
     header.add_artist(Line2D([0.008, 0.028], [y, y], color=colour, linewidth=3.0, gid="run"))
     word = told(run.summary) if run.summary else "no verdict"
     look: dict[str, Any] = {"va": "center", "fontsize": style.TEXT + 1}
-    header.text(0.034, y, word, color=style.VERDICTS.get(word, style.GREY), fontweight="bold", gid="verdict", **look)
+    header.text(0.034, y, word, color=style.verdict_colour(run.summary), fontweight="bold", gid="verdict", **look)
     name = header.text(0.115, y, label, color=style.INK, gid="label", **look)
     style.fit_text(name, header.bbox.width * 0.56)
     numbers = header.text(0.69, y, _numbers(run), color=style.GREY, gid="numbers", **look)

@@ -81,7 +81,7 @@ def _draw_header(figure: Figure | SubFigure, run: RunData) -> None:
     word = told(run.summary) if run.summary else "no verdict"
     sign = figure.text(
         0.012, 0.66, word, fontsize=style.LARGE, fontweight="bold", color="white", va="center", gid="verdict",
-        bbox={"boxstyle": "round,pad=0.35", "facecolor": style.VERDICTS.get(word, style.GREY), "linewidth": 0},
+        bbox={"boxstyle": "round,pad=0.35", "facecolor": style.verdict_colour(run.summary), "linewidth": 0},
     )  # fmt: skip
     right = sign.get_window_extent().x1 / figure.bbox.width
     look: dict[str, Any] = {"color": style.INK, "va": "center"}

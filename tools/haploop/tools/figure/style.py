@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from haploop.tools.figure.data import FigureError
+from haploop.tools.render.terminal import told
 
 if TYPE_CHECKING:
+    from haploop.logger.summary import Summary
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
@@ -29,9 +31,19 @@ VERDICTS = {
     "no-contact": "#555555",
     "undecided": "#555555",
 }
+# Of what is steady with a proviso.
+_PROVISO = "#5C6600"
 TEXT, SMALL, LARGE = 9.0, 8.0, 15.0
 # Letters of a legend that fit above a panel, and what the handle of an entry and a letter of the title take of them.
 _ROOM_LETTERS, _HANDLE_LETTERS, _TITLE_LETTER = 88, 6, 1.25
+
+
+def verdict_colour(summary: Summary | None) -> str:
+    """Returns the colour of a run's verdict; what is steady with a proviso is not as green as what is so without."""
+    if not summary:
+        return GREY
+    has_proviso = summary["verdict"] == "steady" and summary.get("stability", {}).get("provisos")
+    return _PROVISO if has_proviso else VERDICTS.get(told(summary), GREY)
 
 
 def element_colour(number: int) -> str:
