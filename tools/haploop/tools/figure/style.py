@@ -11,11 +11,12 @@ from haploop.tools.figure.data import FigureError
 from haploop.tools.render.terminal import told
 
 if TYPE_CHECKING:
-    from haploop.logger.summary import Summary
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
     from matplotlib.text import Text
+
+    from haploop.logger.summary import Summary
 
 INK, GREY, FAINT = "#222222", "#666666", "#BBBBBB"
 WALL, WALL_FILL, CLOSE = "#0072B2", "#D6E6F2", "#EBD9A8"
