@@ -74,7 +74,8 @@ def test_limits_are_those_of_their_formulas_and_a_reason_stands_where_one_does_n
     assert limit("rho(M) = 1, wall alone", **curved).stiffness_N_m == exact.stiffness_N_m
     foaw = {**curved, "velocity": {"estimator": "foaw", "ticks": 16}}
     assert limit("rho(M) = 1, wall alone", **foaw).stiffness_N_m == exact.stiffness_N_m
-    rough = limit("rho(M) = 1, smooth", **bare, friction={"kinetic": 1e-3})
+    rough = limit("rho(M) = 1, no friction", **bare, friction={"kinetic": 1e-3})
+    assert "rho(M) = 1" not in [found.name for found in limits_of(scene(**bare, friction={"kinetic": 1e-3}), KINDS)]
     assert (rough.stiffness_N_m, rough.why_not) == (exact.stiffness_N_m, "of the loop without [friction]")
     undamped = limit("rho(M) = 1", **bare | {"device": {"mass": M, "damping": 0.0}})
     assert undamped.stiffness_N_m is None

@@ -40,23 +40,23 @@ def limits_of(scene: Scene, kinds: Kinds) -> list[Limit]:
     """Returns all known bounds, then where the map M of one tick stops being stable, rho(M) = 1, from a soft wall on.
 
     Where there are elements, the last is that of the wall alone. Of a loop that friction alone keeps from being linear
-    it is also that of the same loop without friction.
+    it is that of the same loop without friction.
     """
     found = [Limit(bound.name, bound.kind, bound.stiffness_N_m, bound.why_not) for bound in bounds_of(scene, kinds)]
-    found += _smoothed("rho(M) = 1", scene, kinds)
+    found.append(_of_map("rho(M) = 1", scene, kinds))
     # A spring asks for no velocity, so that what estimates it is out of the loop, too.
     is_spring = scene.wall is None or not scene.wall.kind
     alone = replace(scene, dissipation=(), **{"velocity": None, "acceleration": None} if is_spring else {})
-    return [*found, *(_smoothed("rho(M) = 1, wall alone", alone, kinds) if scene.dissipation else [])]
+    return [*found, *([_of_map("rho(M) = 1, wall alone", alone, kinds)] if scene.dissipation else [])]
 
 
-def _smoothed(name: str, scene: Scene, kinds: Kinds) -> list[Limit]:
-    """Returns the exact limit of a loop, and that without friction where only this has one."""
-    of_all, smooth = _exact(name, scene, kinds), replace(scene, friction=None)
+def _of_map(name: str, scene: Scene, kinds: Kinds) -> Limit:
+    """Returns the exact limit of a loop, or that of the loop without friction where friction alone is in the way."""
+    smooth = replace(scene, friction=None)
     if not scene.friction or not is_linear(smooth, kinds):
-        return [of_all]
-    of_smooth = _exact(f"{name}, smooth", smooth, kinds)
-    return [of_all, of_smooth if of_smooth.why_not else replace(of_smooth, why_not="of the loop without [friction]")]
+        return _exact(name, scene, kinds)
+    found = _exact(f"{name}, no friction", smooth, kinds)
+    return found if found.why_not else replace(found, why_not="of the loop without [friction]")
 
 
 def _exact(name: str, scene: Scene, kinds: Kinds) -> Limit:
