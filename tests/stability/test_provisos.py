@@ -10,9 +10,11 @@ import pytest
 
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
-from haploop.launch.stability.decide import Finding
+from haploop.launch.stability import looks
+from haploop.launch.stability.decide import Finding, decide
 from haploop.launch.stability.judge import judge
 from haploop.launch.stability.looks import LOOKS_S
+from haploop.launch.stability.swing import Swing
 from haploop.protocol.scene.effects import Friction
 from helpers.runs.judged import ended, found
 from helpers.scenes.least import scene
@@ -87,6 +89,19 @@ def test_a_loop_without_friction_that_noise_moves_by_as_much_as_a_hand_feels_say
 def test_of_a_push_that_friction_withstands_it_is_said_that_nothing_moved():
     finding = found(scene(**pressed(friction={"kinetic": 0.9})))
     assert (finding.word, finding.why, finding.settles_s) == ("steady", "unmoved", None)
+
+
+def test_of_an_unfelt_swing_that_was_there_all_along_no_time_is_told_after_which_it_came(monkeypatch):
+    swings: list[Swing] = []
+    monkeypatch.setattr(looks, "decide", lambda swing, *, last: swings.append(swing) or decide(swing, last=last))
+    settled = found(scene(**pressed(encoder={"resolution": 1e-5}, wall={"position": 0.0, "stiffness": 300.0})))
+    assert settled.why == "unfelt"
+    assert " within 1.7 s but for 4.73 µm" in settled.sentence()
+    swing = next(each for each in swings if decide(each, last=True).why == "unfelt")
+    throughout = decide(swing._replace(settles_s=0.0), last=True)
+    assert (throughout.word, throughout.settles_s) == ("steady", None)
+    assert "it swung by no more than 4.73 µm" in throughout.sentence()
+    assert " within " not in throughout.sentence()
 
 
 @pytest.mark.slow

@@ -47,6 +47,8 @@ WHY = {
     "unmoved": "After a push of {push_N:.3g} N, which did not move it, it rested.",
     "unfelt": "After a push of {push_N:.3g} N it came to rest within {settles_s:.2g} s but for "
     "{width_um:.3g} µm peak to peak, most at {frequency_Hz:.3g} Hz: less than a hand feels.",
+    "unfelt throughout": "After a push of {push_N:.3g} N it swung by no more than {width_um:.3g} µm peak to peak, most "
+    "at {frequency_Hz:.3g} Hz: less than a hand feels.",
     "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width_mm:.3g} mm peak to peak at "
     "{frequency_Hz:.3g} Hz.",
     "lasts": "Swings of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, growing "
@@ -234,7 +236,8 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     # What dies behind an encoder whose counts still move may leave a chatter of them that is felt.
     settles = falling and swing.count_m > 0.0 and swing.ripple_N > _STILL_N and not is_long
     if unfelt and seen and not (rising or goes_on or settles):
-        return _finding(swing, "steady", "unfelt" if swing.width_m >= REST_M else "rest")
+        ends = ("rest", "unfelt") if swing.settles_s else ("unmoved", "unfelt throughout")
+        return _finding(swing, "steady", ends[swing.width_m >= REST_M])
     if not swing.covers:
         found = _finding(swing, "undecided", "too few")
         return replace(found, width_m=swing.moved_m, frequency_Hz=0.0, rate_1_s=None, error_1_s=None)
