@@ -39,7 +39,7 @@ def test_text_with_a_unit_is_the_same_float_as_the_si_number_to_the_last_bit(tex
     ("given", "sentence"),
     [
         ("2 ms", "ms is a time, but N/m is a stiffness."),
-        ("5 Ns/mm", '"Ns/mm" is not a unit'),
+        ("5 Ns/mm", '"Ns/mm" is not a unit; leave a space between multiplied units.'),
         ("5", 'Text must carry a unit, such as "5 N/m"'),
         ("five N/m", "It must be a number and its unit"),
         ("1e9999 N/m", '"e9999 N/m" is not a unit'),
@@ -60,6 +60,22 @@ def test_what_is_no_usable_number_is_refused_with_the_reason(given, sentence):
     with pytest.raises(PydanticCustomError) as refusal:
         si("N/m", at_least=0).read(given)
     assert refusal.value.message().startswith(sentence)
+
+
+@pytest.mark.parametrize(
+    ("given", "unit", "meant"),
+    [
+        ("3 minits", "s", "minutes"),
+        ("2 milimeter", "m", "millimetres"),
+        ("2 newton metres per", "N/m", ""),
+        ("3 zz", "s", ""),
+    ],
+)
+def test_a_word_that_is_no_unit_is_told_with_the_nearest_unit_of_its_dimension_alone(given, unit, meant):
+    with pytest.raises(PydanticCustomError) as refusal:
+        si(unit).read(given)
+    hint = f"did you mean {meant}?" if meant else "leave a space between multiplied units."
+    assert refusal.value.message().endswith(f"is not a unit; {hint}")
 
 
 @pytest.mark.parametrize("text", ["10 rad/s", "600 rpm"])

@@ -81,6 +81,17 @@ def test_every_mistake_is_reported_at_once():
     assert len(found) == len(starts)
 
 
+def test_keys_below_a_heading_that_was_dropped_are_told_with_the_heading():
+    force = {"kind": "constant", "value": -0.5}
+    found = mistakes(hand={"mass": 0.1, "force": {**force, **WALL}})
+    assert len(found) == 2
+    assert all(line.endswith("Allowed: kind, value. Is the heading [wall] missing above it?") for line in found)
+    there = mistakes(hand={"mass": 0.1, "force": {**force, **WALL}}, wall=WALL)
+    of_none = mistakes(hand={"mass": 0.1, "force": {**force, **WALL, "colour": 1}})
+    alone = mistakes(hand={"mass": 0.1, "force": {**force, "position": 1.0}})
+    assert not any("heading" in line for line in (*there, *of_none, *alone))
+
+
 def test_a_required_key_that_is_misspelt_is_one_mistake_and_one_that_is_misspelt_elsewhere_two():
     (one,) = mistakes(device={"mas": 0.01, "damping": 0.0})
     assert one.startswith("device.mas is not a key of [device]; did you mean mass?")

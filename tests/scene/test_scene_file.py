@@ -209,7 +209,7 @@ def test_a_name_in_extends_that_is_no_file_is_told_with_its_line_and_the_one_tha
 @pytest.mark.parametrize("value", ['"3 N/mm', "'3 N/mm", '["a", "b]', '"""3'])
 def test_a_quotation_mark_that_is_not_closed_is_told_in_words(files, value):
     [mistake] = file_mistakes(files(top=f"title = {value}\nseed = 1\n"))
-    assert mistake.endswith(" A quotation mark is not closed.")
+    assert mistake.endswith(" A quotation mark is not closed. Other mistakes are told once it is.")
 
 
 def test_a_byte_order_mark_is_no_mistake(tmp_path):

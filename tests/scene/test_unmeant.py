@@ -19,6 +19,9 @@ from helpers.scenes.least import KINDS, WALL, scene
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 PUSHED = {"mass": 0.1, "damping": 2.0, "stiffness": 100.0, "force": {"kind": "ramp", "value": -10, "rise_time": 0.1}}
+FORCE = {"kind": "constant"}
+HELD = {"mass": 0.1, "damping": 2.0, "stiffness": 100.0, "grip": {"stiffness": 500.0, "damping": 1.0}}
+HELD["force"] = {**FORCE, "value": -0.2}
 # Tables that break each rule, and a neighbour of them that keeps it; what the sentence must hold.
 CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"duration": 3, "clock": {"control_rate": 10_000, "round_trip_delay": 0.2}},
@@ -34,6 +37,16 @@ CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
      "The wall is never reached"),
     ({"hand": {"mass": 0.1, "force": {"kind": "constant", "value": 1.0}}, "wall": WALL},
      {"hand": {"mass": 0.1, "force": {"kind": "constant", "value": -1.0}}, "wall": WALL}, "away from the wall"),
+    ({"hand": HELD, "wall": WALL}, {"hand": HELD | {"force": {**FORCE, "value": -5.0}}, "wall": WALL},
+     "The wall is never reached"),
+    ({"hand": PUSHED | {"force": {**FORCE, "value": 5.0}}, "wall": WALL}, {"hand": PUSHED, "wall": WALL},
+     "away from the wall"),
+    ({"hand": PUSHED, "noise": {"deviation": 5e-3, "cutoff": 100}},
+     {"hand": PUSHED, "noise": {"deviation": 5e-4, "cutoff": 100}}, "noise.deviation is 0.005 m; is that the unit"),
+    ({"hand": PUSHED, "actuator": {"saturation": 5e-3}}, {"hand": PUSHED, "actuator": {"saturation": 5}},
+     "actuator.saturation is 0.005 N; is that the unit"),
+    ({"hand": PUSHED | {"force": {**FORCE, "value": -1000.0}}},
+     {"hand": PUSHED | {"force": {**FORCE, "value": -100.0}}}, "hand.force.value is -1000 N; is that the unit"),
     ({"hand": PUSHED, "acceleration": {"source": "accelerometer"}},
      {"hand": PUSHED, "acceleration": {"source": "accelerometer"}, "accelerometer": {}}, "so it is ideal"),
     ({"hand": PUSHED, "wall": {"position": 0.01, "stiffness": 150}},
@@ -87,6 +100,18 @@ def test_a_wall_called_out_of_reach_is_not_met_even_by_a_force_at_the_natural_fr
 
     assert not notes_of(0.999 * reached)
     assert notes_of(6.0 * reached + 0.02)
+
+
+@pytest.mark.parametrize("kind", ["step", "ramp"])
+@pytest.mark.parametrize("stiffness", [30.0, 3000.0])
+def test_a_wall_called_out_of_reach_of_a_chain_is_not_met_by_a_force_that_grows(tmp_path, kind, stiffness):
+    force = {"kind": kind, "value": -0.5} | ({"at": 0.1} if kind == "step" else {"rise_time": 0.01})
+    hand = {"mass": 0.05, "stiffness": 100.0, "grip": {"stiffness": stiffness, "damping": 0.01}, "force": force}
+    tables = {"hand": hand, "device": {"mass": 0.05, "damping": 0.01}}
+    reached = farthest_m(tmp_path, **tables)
+    assert reached > 0.007
+    assert not note_unmeant(scene(**tables, wall={"position": -0.999 * reached, "stiffness": 10}))
+    assert note_unmeant(scene(**tables, wall={"position": -3.0 * reached - 0.005, "stiffness": 10}))
 
 
 def test_what_may_yet_push_or_reach_silences_the_rule():

@@ -298,6 +298,8 @@ def test_a_log_of_ticks_alone_shows_what_the_controller_measured(runs: dict[str,
     data = RunData.from_directory(runs["ticks"])
     assert not data.every_step
     np.testing.assert_array_equal(data.x_m, read(runs["ticks"])["/controller"]["x"])
+    assert "penetration as measured (mm)" in [ax.get_xlabel() for ax in axes(make_figure(data))]
+    assert "penetration (mm)" in [ax.get_xlabel() for ax in axes(make_figure(RunData.from_directory(runs["swap"])))]
 
 
 def test_a_run_without_log_or_without_ticks_says_so(tmp_path: Path) -> None:

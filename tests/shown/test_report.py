@@ -17,6 +17,7 @@ from haploop.protocol.quantity import Quantity
 from haploop.tools.render.cause import cause
 from haploop.tools.render.progress import ProgressLine
 from haploop.tools.render.report import plugins_table, status_table, summary_table
+from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount, fixed
 from helpers.shown import row, shown
 
@@ -54,6 +55,13 @@ def test_the_summary_table_begins_with_the_verdict_and_what_was_seen(swap: dict[
     first, second = shown(summary_table(swap), 200).splitlines()[:2]
     assert first.split() == [swap["verdict"], *swap["title"].split()]
     assert swap["verdict_rule"].startswith(second.strip().rstrip("."))
+
+
+def test_a_run_too_short_for_a_window_is_told_as_that_and_not_as_one_without_a_swing(swap: dict[str, Any]) -> None:
+    unjudged = {key: value for key, value in swap.items() if key != "stability"} | {"verdict": "steady"}
+    assert [told({**unjudged, "duration_s": s}) for s in (0.2, 0.6)] == ["too short to see", "no swing seen"]
+    assert told({**swap, "verdict": "steady", "duration_s": 0.2}) == "steady"
+    assert row(shown(summary_table({**swap, "ticks": 1}), 100), "ran")[0].startswith("3 s, 1 tick, in")
 
 
 @pytest.mark.parametrize(("verdict", "is_told"), [("steady", False), ("limit-cycle", True), ("growing", True)])

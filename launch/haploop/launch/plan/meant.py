@@ -17,6 +17,9 @@ _USUAL = (
     ("wall.stiffness", 1.0, 1e6, "N/m"),
     ("device.mass", 1e-4, 10.0, "kg"),
     ("encoder.resolution", 1e-10, 1e-3, "m"),
+    ("noise.deviation", 1e-10, 1e-3, "m"),
+    ("actuator.saturation", 0.05, 1e3, "N"),
+    ("hand.force.value", 1e-3, 200.0, "N"),
 )
 _MANY_TICKS, _DEEP_M = 1000, 1e-3
 _LONG_TICKS = 10_000_000
@@ -69,12 +72,15 @@ def _out_of_reach(scene: Scene) -> Found | None:
     coth(pi z / (2 sqrt(1 - z^2))) / k with z = b / (2 sqrt(k m)). Without a spring |v| is at most |v0| + F_max t / m.
     """
     hand, device, wall = scene.hand, scene.device, scene.wall
-    chained = scene.transmission or (hand and hand.grip)
     always = any(element.acts == "always" for element in scene.dissipation)
-    if wall is None or hand_is_unmodelled(scene) or scene.others or scene.noise or chained or always:
+    if wall is None or hand_is_unmodelled(scene) or scene.others or scene.noise or always:
         return None
     if _wall_moves(scene) or _start_depth_m(scene) > 0.0 or _pushed_by_nothing(scene) is not None:
         return None
+    if scene.transmission or (hand and hand.grip):
+        reach_m = _reach_of_chain_m(scene)
+        way_m = abs(wall.position - device.position) - _count_m(scene)
+        return {"way_mm": way_m * 1e3, "reach_mm": reach_m * 1e3} if way_m > reach_m else None
     mass, damping = device.mass + (hand.mass if hand else 0.0), device.damping + (hand.damping if hand else 0.0)
     force_N, spring = _most_force_N(scene), hand.stiffness if hand else 0.0
     if scene.friction:
@@ -92,10 +98,27 @@ def _out_of_reach(scene: Scene) -> Found | None:
     return {"way_mm": way_m * 1e3, "reach_mm": reach_m * 1e3} if way_m > reach_m and not is_told else None
 
 
+def _reach_of_chain_m(scene: Scene) -> float:
+    """Returns a bound of the way of a chain of springs from rest under a force that only grows; infinity of any other.
+
+    A step of F on the hand's mass gives F s_0 to the springs at most, s_i their stretches, s_0 that to the ground:
+    k_0 s_0^2 + sum k_i s_i^2 <= 2 F s_0, so s_0 <= 2 F / k_0 and sum k_i s_i^2 <= F^2 / k_0; a force that grows is a
+    sum of steps.
+    """
+    hand, device = scene.hand, scene.device
+    grows = hand and hand.force and hand.force.kind in ("constant", "ramp", "step", "minimum-jerk")
+    if hand is None or not grows or not hand.stiffness or device.velocity or device.position != hand.rest:
+        return math.inf
+    give = [spring.stiffness for spring in (scene.transmission, hand.grip) if spring]
+    force_N, ground = _most_force_N(scene), hand.stiffness
+    return force_N * (2.0 / ground + math.sqrt(sum(1.0 / stiffness for stiffness in give) / ground))
+
+
 def _pushed_away(scene: Scene) -> Found | None:
     """Tells whether a force that keeps its sign drives a device away from a wall that it does not touch."""
     hand, wall = scene.hand, scene.wall
-    if wall is None or hand is None or hand.stiffness or scene.event or scene.others or _start_depth_m(scene) >= 0.0:
+    held = hand and hand.stiffness and hand.rest != scene.device.position
+    if wall is None or hand is None or held or scene.event or scene.others or _start_depth_m(scene) >= 0.0:
         return None
     inward = -1.0 if wall.occupies == "below" else 1.0
     value_N = getattr(hand.force, "value", 0.0)
@@ -191,7 +214,7 @@ def note_unmeant(scene: Scene) -> list[str]:
     unusual = [
         f"{key} is {value:g} {unit}; is that the unit that was meant? Haptic loops have {least:g} to {most:g} {unit}."
         for key, least, most, unit in _USUAL
-        if (value := value_at(scene, key)) and not least <= value <= most
+        if (value := value_at(scene, key)) and not least <= abs(value) <= most
     ]
     broken = [(rule.sentence, rule.broken(scene)) for rule in RULES]
     return unusual + [sentence.format(**found) for sentence, found in broken if found is not None]

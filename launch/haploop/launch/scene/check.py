@@ -156,7 +156,8 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
             *table, name = key
             keys = list(schema_at(schema, tuple(table), layers.data).get("properties", {}))
             where = f"[{'.'.join(map(str, table))}]" if table else f"a {schema['title'].lower()}"
-            layers.complain(key, f"Allowed: {', '.join(keys)}.", f"is not a key of {where}", nearest(name, keys))
+            expected = f"Allowed: {', '.join(keys)}.{_heading(layers, schema, tuple(table), keys)}"
+            layers.complain(key, expected, f"is not a key of {where}", nearest(name, keys))
         case "missing":
             layers.complain(key, f"It must be {_form(rule)}.{_of_a_device(layers, key)}", "is missing")
         case "union_tag_not_found":
@@ -179,6 +180,14 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
             layers.complain(key, f"It must be one table: [{key[-1]}], one pair of brackets.", "is a list of tables")
         case _:
             layers.complain(key, _FORMS.get(what, f"{message}."))
+
+
+def _heading(layers: Layers, schema: Schema, table: KeyPath, keys: list[str]) -> str:
+    """Asks after a missing heading where all strange keys of a table are those of one absent table; "" elsewhere."""
+    strange = layers.value(table).keys() - keys
+    absent = schema["properties"].keys() - layers.data.keys()
+    homes = [name for name in absent if strange <= schema_at(schema, (name,), {}).get("properties", {}).keys()]
+    return f" Is the heading [{homes[0]}] missing above it?" if len(strange) > 1 and len(homes) == 1 else ""
 
 
 def _is_list_of_tables(value: object) -> bool:

@@ -16,6 +16,7 @@ from pydantic import GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+from haploop.protocol.names import nearest
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.quantity import si as quantity
 
@@ -257,12 +258,31 @@ def _convert_any(amount: Decimal, unit: str, target: str) -> Decimal:
         angles = [_angle_power(units.Quantity(Decimal(1), u)) for u in (given, wanted)]
     except Exception as error:  # what a parser of arbitrary text raises is not documented
         example = f', such as "{target}"' if " " in target else ""
-        raise ValueError(f'"{unit}" is not a unit; leave a space between multiplied units{example}.') from error
+        hint = f"did you mean {meant}?" if (meant := _meant(unit, target)) else ""
+        hint = hint or f"leave a space between multiplied units{example}."
+        raise ValueError(f'"{unit}" is not a unit; {hint}') from error
     if given.dimensionality != wanted.dimensionality:
         raise ValueError(_another_dimension(unit, given.dimensionality, target, wanted.dimensionality))
     if angles[0] != angles[1]:
         raise ValueError(_angle(unit, target))
     return units.Quantity(amount, given).to(wanted).magnitude
+
+
+# Names that units are given by in words, with their signs.
+_IN_WORDS = {
+    "seconds": "s", "milliseconds": "ms", "microseconds": "us", "minutes": "min", "metres": "m", "centimetres": "cm",
+    "millimetres": "mm", "micrometres": "um", "grams": "g", "kilograms": "kg", "newtons": "N", "hertz": "Hz",
+    "kilohertz": "kHz",
+}  # fmt: skip
+
+
+def _meant(unit: str, target: str) -> str | None:
+    """Returns the name of a unit of the dimension of ``target`` that comes nearest to a word that is none."""
+    if (wanted := _exact(target)) is None:
+        return None
+    signs = {**dict.fromkeys(_UNITS), **_IN_WORDS}
+    alike = [name for name, sign in signs.items() if (_exact(sign or name) or ((),))[0] == wanted[0]]
+    return nearest(unit, alike)
 
 
 def _angle_power(quantity: Any) -> Any:

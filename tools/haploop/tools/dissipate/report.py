@@ -54,11 +54,11 @@ _COUNTS = {
     "unusable_rows": "Rows left out, since a number in them is missing or not finite: {count}.",
     "bridged": "Single missing samples, taken as the mean of their neighbours: {count}.",
     "repeated": (
-        "{count} samples ({percent:.2g} %) repeat the one before in mid-motion, as where a sensor is read faster than "
-        "it measures: each looks like a stop and a jump, in which an inertia seems to generate energy."
+        "Samples that repeat the one before in mid-motion: {count} ({percent:.2g} %), as where a sensor is read faster "
+        "than it measures. Each looks like a stop and a jump, in which an inertia seems to generate energy."
     ),
     "uneven": (
-        "{count} periods are more than a tenth off the others; estimates take them for equal, as a controller does "
+        "Periods more than a tenth off the others: {count}. Estimates take them for equal, as a controller does "
         "that counts its ticks."
     ),
 }
@@ -71,7 +71,8 @@ def make_report(outcome: Outcome) -> RenderableType:
     for element in rows(outcome):
         table.add_row(*make_row(element))
     head = Text(f"{outcome.recording.name}: {conclusion(outcome)}", style="bold")
-    return Group(head, table, *(Text(sentence, style="dim") for sentence in note_sentences(outcome)))
+    doubts = [Text(sentence, style="bold yellow") for sentence in outcome.recording.notes.remarks]
+    return Group(*doubts, head, table, *(Text(sentence, style="dim") for sentence in note_sentences(outcome)))
 
 
 def rows(outcome: Outcome) -> list[ElementOutcome]:

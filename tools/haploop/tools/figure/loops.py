@@ -53,7 +53,8 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
         look = {"fontsize": style.SMALL + 1, "color": style.GREY, "transform": ax.transAxes}
         ax.text(0.5, 0.5, text, ha="center", va="center", **look)
         return
-    style.dress(ax, title, "penetration (mm)", "force out of the wall (N)")
+    measured = "" if run.every_step else " as measured"
+    style.dress(ax, title, f"penetration{measured} (mm)", "force out of the wall (N)")
     early_depth, early_force = force_position_loop(run, run.early_s())
     depth, force = force_position_loop(run, span_s)
     early = {"color": style.EARLY, "linewidth": 0.8, "label": "first second of contact", "gid": "early"}

@@ -6,6 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from haploop.launch.processes.foreign import described
+from haploop.launch.scene.mistakes import counted
 from haploop.tools.render.cause import SWINGS, cause
 from haploop.tools.render.terminal import console, make_facts, make_table, seen, told, verdict_style
 from haploop.tools.render.units import amount, fixed, parameters, spring
@@ -87,7 +88,7 @@ def summary_table(summary: Summary) -> RenderableType:
 
 def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     window = summary["window"]
-    ran = f"{summary['duration_s']:g} s, {summary['ticks']} ticks"
+    ran = f"{summary['duration_s']:g} s, {counted(summary['ticks'], 'tick')}"
     if summary["wall_s"]:
         ran += f", in {amount(summary['wall_s'], 's')} ({fixed(summary['real_time_factor'])} times real time)"
     figures = [

@@ -40,7 +40,12 @@ def seen(verdict: str) -> str:
 
 def told(summary: Summary) -> str:
     """Returns the verdict of a run, or the word for what was seen of one that was not judged."""
-    return summary["verdict"] if "stability" in summary else seen(summary["verdict"])
+    from haploop.logger.verdict.measures import WINDOW_S
+
+    if "stability" in summary:
+        return summary["verdict"]
+    is_short = summary["verdict"] == "steady" and summary["duration_s"] < WINDOW_S
+    return "too short to see" if is_short else seen(summary["verdict"])
 
 
 def verdict_style(verdict: str) -> str:

@@ -53,7 +53,7 @@ def parse(
     except UnicodeDecodeError as error:
         problem = f"A {what} must be UTF-8 text, but byte {error.start} is not."
     except ValueError as error:
-        problem = f"This is not TOML: {error}.{_hint(str(error), text)}"
+        problem = f"This is not TOML: {error}.{_hint(str(error), text)} Other mistakes are told once it is."
     except RecursionError:
         problem = _TOO_DEEP
     raise SceneError([Mistake(shown(path), "", "", problem)])
