@@ -1,10 +1,9 @@
-"""Text recordings: columns, units, what is missing, what is out of order, and what is said about it."""
+"""Text recordings: columns, what is missing, what is out of order, and what is said about it."""
 
 from __future__ import annotations
 
 import tracemalloc
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,19 +14,7 @@ from haploop.controller.dissipation import ElementError
 from haploop.tools.dissipate.report import note_sentences
 from haploop.tools.dissipate.samples import RecordingError
 from haploop.tools.dissipate.text_recording import Layout, TextRecording
-from helpers.data.recordings import outcome, write
-
-T = np.arange(200) * 1e-3
-X = 2e-3 * np.sin(2.0 * np.pi * 15.0 * T)
-
-
-def true_J(path: Path, layout: Layout | None = None) -> float:
-    return outcome(path, layout=layout, dampings=["2.7"]).elements[0].true_J
-
-
-@pytest.fixture
-def plain(tmp_path: Path) -> Path:
-    return write(tmp_path / "plain.csv", {"t": T, "x": X})
+from helpers.data.recordings import T, X, outcome, true_J, write
 
 
 def test_columns_are_found_by_name_number_or_guess(plain: Path, tmp_path: Path) -> None:
@@ -56,36 +43,6 @@ def test_a_file_without_a_header_has_columns_by_number(plain: Path, tmp_path: Pa
     assert true_J(path, Layout("2", "1")) == pytest.approx(true_J(plain), rel=1e-12)
     if head.startswith("# t x"):
         assert true_J(path) == pytest.approx(true_J(plain), rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("columns", "layout"),
-    [
-        ({"t (ms)": T * 1e3, "x (mm)": X * 1e3}, Layout()),
-        ({"t [ms]": T * 1e3, "x [um]": X * 1e6}, Layout()),
-        ({"t": T * 1e3, "x": X * 1e3}, Layout(length="mm", time_unit="ms")),
-        ({"t": T, "x": X / 2.87e-5}, Layout(length="2.87e-5")),
-        ({"t (s)": T, "x (mm)": X}, Layout(length="m")),
-    ],
-)
-def test_units_come_from_the_header_or_are_given(
-    plain: Path, tmp_path: Path, columns: dict[str, np.ndarray], layout: Layout
-) -> None:
-    path = write(tmp_path / "units.csv", columns)
-    assert true_J(path, layout) == pytest.approx(true_J(plain), rel=1e-9)
-
-
-def test_recorded_rates_have_the_units_of_the_lengths(tmp_path: Path) -> None:
-    v, a = np.gradient(X, 1e-3), np.gradient(np.gradient(X, 1e-3), 1e-3)
-    si = write(tmp_path / "si.csv", {"t": T, "x": X, "v": v, "a": a})
-    mm = write(tmp_path / "mm.csv", {"t": T, "x": X * 1e3, "v (mm/s)": v * 1e3, "a": a * 1e3})
-    layout = Layout(velocity="v", acceleration="a")
-    selection: dict[str, Any] = {"dampings": ["1.0"], "masses": ["0.01"]}
-    expected = [element.true_J for element in outcome(si, layout=layout, **selection).elements]
-    in_mm = Layout(velocity="v", acceleration="a", length="mm", acceleration_unit="mm/s^2")
-    found = outcome(mm, layout=in_mm, **selection)
-    assert [element.true_J for element in found.elements] == pytest.approx(expected, rel=1e-9)
-    assert found.recording.recorded == {"acceleration", "velocity"}
 
 
 def test_what_is_missing_is_a_gap_and_counted(tmp_path: Path) -> None:
@@ -134,75 +91,6 @@ def test_samples_that_repeat_in_mid_motion_are_counted_and_a_device_at_rest_is_n
     found = outcome(write(tmp_path / "twice.csv", {"t": T, "x": x}), masses=["0.01"])
     assert 15 <= found.recording.notes.repeated <= 21
     assert any("repeat the one before" in sentence for sentence in note_sentences(found))
-
-
-@pytest.mark.parametrize("name", ["t", "time", "Stamp"])
-def test_times_far_apart_without_a_unit_are_asked_after(tmp_path: Path, name: str) -> None:
-    path = write(tmp_path / "ticks.csv", {name: 1001.0 + np.arange(200.0), "x": X})
-    layout = Layout(time=name)
-    with pytest.raises(RecordingError, match=r"1001, 1002 and so on, seconds, milliseconds or microseconds\? Give"):
-        outcome(path, layout=layout, dampings=["1.0"])
-    broken_ms = write(tmp_path / "broken_ms.csv", {name: 1001.25 + np.arange(200.0), "x": X})
-    with pytest.raises(RecordingError, match=r"1001\.25, 1002\.25 and so on, seconds, milliseconds"):
-        outcome(broken_ms, layout=layout, dampings=["1.0"])
-    given = Layout(time=name, time_unit="ms")
-    assert outcome(path, layout=given, dampings=["1.0"]).recording.period_s == pytest.approx(1e-3)
-    seconds = write(tmp_path / "seconds.csv", {"time_s": 1001.0 + np.arange(200.0), "x": X})
-    assert outcome(seconds, dampings=["1.0"]).recording.period_s == 1.0
-
-
-def test_positions_too_far_apart_for_metres_are_asked_after_unless_a_unit_says_so(tmp_path: Path) -> None:
-    columns = {"t": T, "position": X / np.ptp(X)}
-    path = write(tmp_path / "mm.csv", {**columns, "position": 4.0 * columns["position"]})
-    with pytest.raises(RecordingError, match=r"metres, millimetres or counts\? Give --unit m, mm or metres a count"):
-        outcome(path, dampings=["1.0"])
-    for unit in ("mm", "0.001"):
-        assert not outcome(path, layout=Layout(length=unit), dampings=["1.0"]).recording.notes.remarks
-    doubtful = write(tmp_path / "doubtful.csv", {**columns, "position": 0.5 * columns["position"]})
-    assert any("taken for metres, 0.5 m" in words for words in note_sentences(outcome(doubtful, dampings=["1.0"])))
-    named = write(tmp_path / "named.csv", {"t": T, "x_m": 0.5 * columns["position"]})
-    assert not any("taken for metres" in words for words in note_sentences(outcome(named, dampings=["1.0"])))
-
-
-F = 4.0 * np.sin(2.0 * np.pi * 15.0 * T)
-
-
-@pytest.mark.parametrize(
-    ("columns", "hardly"),
-    [
-        ({"t (s)": T, "x (m)": X, "F (N)": F}, []),
-        ({"t (ms)": 1e3 * T, "x (mm)": 1e3 * X, "F (mN)": 1e3 * F}, []),
-        ({"t (s)": T, "x (m)": 0.5 * np.sin(2.0 * T), "F (N)": F}, []),
-        ({"t (s)": T, "x (m)": 1e3 * X, "F (N)": F}, ["moves 4.00 m in all", "moves at"]),
-        ({"t (s)": T, "x (m)": 200 * X, "F (N)": F}, ["moves at"]),
-        ({"t (s)": T, "x (mm)": X, "F (N)": F}, ["moves 4.00 µm in all"]),
-        ({"t (s)": 1e3 * T, "x (m)": X, "F (N)": F}, ["samples 1.00 s apart"]),
-        ({"t (ms)": T, "x (m)": X, "F (N)": F}, ["samples 1.00 µs apart"]),
-        ({"t (s)": T, "x (m)": X, "F (mN)": F}, ["force of 4.00 mN at most"]),
-        ({"t (s)": T, "x (m)": X, "F (N)": 1e3 * F}, ["force of 4.00 kN at most"]),
-    ],
-)
-def test_a_unit_that_makes_of_the_numbers_what_no_device_does_is_asked_after(
-    tmp_path: Path, columns: dict[str, np.ndarray], hardly: list[str]
-) -> None:
-    path = write(tmp_path / "declared.csv", columns)
-    remarks = outcome(path, layout=Layout(force="F"), dampings=["1.0"]).recording.notes.remarks
-    assert len(remarks) == len(hardly), remarks
-    for words, remark in zip(hardly, remarks, strict=True):
-        assert words in remark
-        assert remark.startswith("Can that be meant")
-
-
-def test_a_unit_of_recorded_rates_is_asked_after_too(tmp_path: Path) -> None:
-    columns = {"t": T, "x": X, "v (m/s)": 1e3 * np.gradient(X, 1e-3), "a (m/s^2)": np.full(200, 9810.0)}
-    layout = Layout(velocity="v", acceleration="a")
-    remarks = outcome(write(tmp_path / "rates.csv", columns), layout=layout, dampings=["1.0"]).recording.notes.remarks
-    assert ["velocity of 188 m/s" in remarks[0], "acceleration of 9.81 km/s²" in remarks[1]] == [True, True], remarks
-
-
-def test_a_mass_that_may_be_in_grams_is_asked_after(plain: Path) -> None:
-    assert any("a mass without a unit is in kg" in words for words in note_sentences(outcome(plain, masses=["1.8"])))
-    assert not any("without a unit" in words for words in note_sentences(outcome(plain, masses=["1.8 g"])))
 
 
 def test_uneven_times_are_counted_and_change_nothing(plain: Path, tmp_path: Path) -> None:

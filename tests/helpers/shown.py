@@ -28,3 +28,8 @@ def row(text: str, begins: str) -> list[str]:
 def words(figure: Any, name: str) -> list[str]:
     """The texts drawn under a name, each on one line."""
     return [" ".join(text.get_text().split()) for text in artists(figure, name)]
+
+
+def axes(figure: Any) -> list[Any]:
+    """The axes that are on, of all parts of a figure."""
+    return [ax for part in figure.subfigs for ax in part.axes if ax.axison]

@@ -16,6 +16,9 @@ from haploop.tools.dissipate.text_recording import Layout
 from helpers.scenes.least import KINDS
 
 PERIOD_S = 1e-3
+# A swing of 2 mm at 15 Hz: times, s, and positions, m.
+T = np.arange(200) * PERIOD_S
+X = 2e-3 * np.sin(2.0 * np.pi * 15.0 * T)
 
 
 def write(path: Path, columns: Mapping[str, Any], mark: str = ",") -> Path:
@@ -28,6 +31,11 @@ def write(path: Path, columns: Mapping[str, Any], mark: str = ",") -> Path:
 def outcome(path: Path, *, delay_s: float | None = None, layout: Layout | None = None, **selection: Any) -> Outcome:
     """Books a recording and returns the outcome."""
     return compute_outcome(Request(path, Selection(**selection), layout or Layout(), delay_s), KINDS)
+
+
+def true_J(path: Path, layout: Layout | None = None) -> float:
+    """What 2.7 N s/m of damping would have taken."""
+    return outcome(path, layout=layout, dampings=["2.7"]).elements[0].true_J
 
 
 def booking(
