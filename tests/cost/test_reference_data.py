@@ -111,15 +111,6 @@ def test_of_the_chaotic_scene_the_swings_can_be_compared_though_not_the_position
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "ticks"), [("wall_steady", 800), ("wall_limit_cycle", 1000), ("all_effects", 40)])
-def test_fifty_digits_give_the_stored_numbers_again(name, ticks):
-    short = accuracy_scene(name, f"duration={ticks / 1000}")
-    again = in_digits(short, 50)
-    assert again.x_m == stored(name).x_m[: ticks + 1].tolist()
-    assert again.v_m_s == stored(name).v_m_s[: ticks + 1].tolist()
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_fifty_digits_give_all_stored_numbers_again(name):
     again, reference = in_digits(accuracy_scene(name), 50), stored(name)

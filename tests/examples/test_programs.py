@@ -65,7 +65,7 @@ def assert_same(log: Recording, truth: Recording) -> None:
 
 @pytest.mark.parametrize("given", ["--node", "--external"])
 def test_the_protocols_page_names_what_a_program_is_told_at_its_start_and_nothing_else(
-    given: str, tmp_path: Path, running: Start
+    given: str, running: Start
 ) -> None:
     _, _, after = PAGE.read_text(encoding="utf-8").partition("The JSON holds")
     rows = [line for line in after.split("\n\n")[1].splitlines() if line.startswith("| `")]
@@ -88,7 +88,7 @@ def test_the_protocols_page_names_what_a_program_is_told_at_its_start_and_nothin
 def test_a_controller_of_another_language_gives_every_column_of_our_own_to_the_bit(
     name: str, scene: str, tmp_path: Path, running: Start
 ) -> None:
-    run = running(*seat("controller", program(name, tmp_path)), scene=SCENES / scene, sets=(), pace=FREE)
+    run = running(*seat("controller", program(name)), scene=SCENES / scene, sets=(), pace=FREE)
     programs = run.summary()["programs"]
     assert (programs["controller"]["name"], programs["controller"]["own"]) == (name, False)
     assert programs["plant"]["own"]
@@ -102,7 +102,7 @@ def test_a_controller_of_another_language_carries_out_what_is_set_at_the_tick_th
 ) -> None:
     changes = '[{at = 1.0, set = {"wall.stiffness" = 120.0, "clock.round_trip_delay" = 0.0035}},'
     changes += '{at = 1.5, set = {"wall.position" = -0.0601}}]'
-    words = seat("controller", program(name, tmp_path))
+    words = seat("controller", program(name))
     run = running(*words, scene=SCENES / scene, sets=(f"event={changes}",), pace=FREE)
     run.end(0)
     assert_same(haploop.logger.read(run.out_directory), own(tmp_path, scene, f"event={changes}"))
@@ -113,7 +113,7 @@ def test_a_swap_that_a_controller_cannot_make_stands_in_the_log_as_refused_and_c
     name: str, scene: str, tmp_path: Path, running: Start
 ) -> None:
     swap = 'event=[{at = 1.5, swap = {kind = "damping", damping = 5.0}}]'
-    run = running(*seat("controller", program(name, tmp_path)), scene=SCENES / scene, sets=(swap,), pace=FREE)
+    run = running(*seat("controller", program(name)), scene=SCENES / scene, sets=(swap,), pace=FREE)
     run.end(0)
     log = haploop.logger.read(run.out_directory)
     (refused,) = [event for event in log["/events"] if "refused" in event]
@@ -156,9 +156,9 @@ def test_a_plant_that_diverges_ends_the_run_at_the_tick_at_which_our_own_does_th
 @pytest.mark.parametrize("how", ["to its end", "killed", "without its launcher"])
 @pytest.mark.parametrize(("role", "name", "scene"), SEATS)
 def test_a_program_joins_a_run_that_waits_for_it_and_neither_outlives_the_other(
-    role: str, name: str, scene: str, how: str, tmp_path: Path, running: Start
+    role: str, name: str, scene: str, how: str, running: Start
 ) -> None:
-    words = program(name, tmp_path)
+    words = program(name)
     sets = () if how == "to its end" else ("duration=600",)
     run = running("--external", role, scene=SCENES / scene, sets=sets, pace=FREE)
     file = awaited(run, role)
@@ -185,10 +185,10 @@ def test_a_program_joins_a_run_that_waits_for_it_and_neither_outlives_the_other(
 @pytest.mark.parametrize(("role", "name", "scene"), SEATS)
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_program_that_is_killed_or_hangs_ends_the_run_by_name_and_leaves_nothing(
-    number: signal.Signals, role: str, name: str, scene: str, tmp_path: Path, running: Start
+    number: signal.Signals, role: str, name: str, scene: str, running: Start
 ) -> None:
     deadline = (BRIEF,) if number == signal.SIGSTOP else ()
-    run = running(*seat(role, program(name, tmp_path)), scene=SCENES / scene, sets=("duration=600", *deadline))
+    run = running(*seat(role, program(name)), scene=SCENES / scene, sets=("duration=600", *deadline))
     run.reaches(100)
     run.send(role, number)
     run.end(1)
@@ -199,8 +199,8 @@ def test_a_program_that_is_killed_or_hangs_ends_the_run_by_name_and_leaves_nothi
 
 
 @pytest.mark.parametrize(("role", "name", "scene"), SEATS)
-def test_a_program_ends_with_the_launcher(role: str, name: str, scene: str, tmp_path: Path, running: Start) -> None:
-    run = running(*seat(role, program(name, tmp_path)), scene=SCENES / scene, sets=("duration=600",))
+def test_a_program_ends_with_the_launcher(role: str, name: str, scene: str, running: Start) -> None:
+    run = running(*seat(role, program(name)), scene=SCENES / scene, sets=("duration=600",))
     run.reaches(100)
     run.signal(signal.SIGKILL)
     wait_for("the end of the nodes", lambda: not alive(list(run.nodes.values())))
@@ -208,9 +208,9 @@ def test_a_program_ends_with_the_launcher(role: str, name: str, scene: str, tmp_
 
 @pytest.mark.parametrize(("role", "name", "scene"), SEATS)
 def test_what_strangers_send_changes_no_bit_of_a_run_with_a_program_of_another_language(
-    role: str, name: str, scene: str, tmp_path: Path, running: Start
+    role: str, name: str, scene: str, running: Start
 ) -> None:
-    words = seat(role, program(name, tmp_path))
+    words = seat(role, program(name))
     undisturbed = running(*words, scene=SCENES / scene, sets=(), pace=FREE).summary()
     run = running(*words, scene=SCENES / scene, sets=(STANDS,), pace=FREE)
     run.stands(500)
@@ -238,15 +238,15 @@ def test_what_strangers_send_changes_no_bit_of_a_run_with_a_program_of_another_l
     ],
 )
 def test_a_scene_that_asks_for_more_than_a_program_can_ends_the_run_with_its_sentence(
-    role: str, name: str, scene: str, says: str, tmp_path: Path, running: Start
+    role: str, name: str, scene: str, says: str, running: Start
 ) -> None:
-    run = running(*seat(role, program(name, tmp_path)), scene=SCENES / scene, sets=(), pace=FREE)
+    run = running(*seat(role, program(name)), scene=SCENES / scene, sets=(), pace=FREE)
     run.end(1)
     assert says in run.stderr
 
 
 def test_the_observer_in_c_misses_nothing_changes_nothing_and_ends_with_the_run(tmp_path: Path, running: Start) -> None:
-    observer = compiled("observer.c", tmp_path)
+    observer = compiled("observer.c")
     run = running(scene=SCENES / "fig6b.toml", sets=(STANDS,), pace=FREE)
     run.stands(500)
     pipe = subprocess.PIPE
@@ -267,8 +267,8 @@ def test_the_observer_in_c_misses_nothing_changes_nothing_and_ends_with_the_run(
     assert numbers == [x[seen].min(), x[seen].max(), force[seen].min(), force[seen].max()]
 
 
-def test_the_observer_in_c_notices_that_the_launcher_was_killed(tmp_path: Path, running: Start) -> None:
-    observer = compiled("observer.c", tmp_path)
+def test_the_observer_in_c_notices_that_the_launcher_was_killed(running: Start) -> None:
+    observer = compiled("observer.c")
     run = running()
     run.reaches(10)
     with subprocess.Popen([*observer, str(sockets(run))], stderr=subprocess.PIPE, text=True) as process:
@@ -283,7 +283,7 @@ def test_the_observer_in_c_notices_that_the_launcher_was_killed(tmp_path: Path, 
         assert "launcher is gone" in process.stderr.read()
 
 
-def test_the_steering_client_says_what_became_of_a_command_and_exits_by_it(tmp_path: Path, running: Start) -> None:
+def test_the_steering_client_says_what_became_of_a_command_and_exits_by_it(running: Start) -> None:
     run = running(scene=SCENES / "fig6b.toml")
     run.reaches(1)
     client = [*in_node("steer.js"), str(sockets(run) / "run.json")]

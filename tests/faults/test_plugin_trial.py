@@ -12,7 +12,8 @@ from haploop.controller.dissipation import ElementError, PluginError
 from haploop.controller.dissipation.registry import load_source
 from haploop.launch.processes.plugin_trial import PluginTrial
 from haploop.protocol.scene.scene import ElementTable
-from helpers.live.launched import command, first_and_slowly, processes_of, wait_for
+from helpers.live.in_process import ask
+from helpers.live.launched import first_and_slowly, processes_of, wait_for
 from helpers.scenes.brake import source
 
 NEVER = "while True: pass"
@@ -132,10 +133,9 @@ def test_a_file_that_ends_or_holds_its_process_is_a_sentence_at_launch_and_nothi
 ):
     plugin, out = tmp_path / "brake.py", tmp_path / "out"
     plugin.write_text(source(statement))
-    done = command("run", str(scene), "--plugin", str(plugin), "--out", str(out), *way)
-    assert done.returncode == 2
+    done = ask("run", str(scene), "--plugin", str(plugin), "--out", str(out), *way)
+    assert (done.status, done.broken()) == (2, "")
     assert f"The plugin {plugin}" in done.stderr
-    assert "Traceback" not in done.stderr
     assert not out.exists()
 
 
@@ -148,7 +148,6 @@ def test_what_is_no_python_file_is_a_sentence(kind, scene, tmp_path):
         os.mkfifo(plugin)
     else:
         plugin.write_bytes(b"#" * (1 << 21) if kind == "large" else bytes(range(256)))
-    done = command("run", str(scene), "--plugin", str(plugin), "--out", str(tmp_path / "out"))
-    assert done.returncode == 2
+    done = ask("run", str(scene), "--plugin", str(plugin), "--out", str(tmp_path / "out"))
+    assert (done.status, done.broken()) == (2, "")
     assert f"The plugin {plugin} does not load: " in done.stderr
-    assert "Traceback" not in done.stderr

@@ -12,7 +12,8 @@ import pytest
 
 from haploop.launch.processes import private_directory, run_directory
 from haploop.launch.spec import OutputError
-from helpers.live.launched import LONG, SCENE, command, first_and_slowly, wait_for
+from helpers.live.in_process import ask
+from helpers.live.launched import LONG, SCENE, first_and_slowly, wait_for
 
 LONG_AGO = (0, 0)
 # Holds a directory's lock until its standard input closes, as a launcher does that nobody's list of processes shows.
@@ -53,8 +54,8 @@ def dead(name: str = "abcdef") -> Path:
 
 def test_status_clears_away_what_a_dead_run_has_left():
     path = dead()
-    answer = command("status")
-    assert (answer.returncode, answer.stdout.strip()) == (0, "No run is live.")
+    answer = ask("status")
+    assert (answer.status, answer.stdout.strip()) == (0, "No run is live.")
     assert not path.exists()
 
 
@@ -72,7 +73,7 @@ def test_a_folder_that_no_run_has_made_stays_with_all_that_is_in_it(name, live_r
     for path in (folder, empty):
         os.utime(path, LONG_AGO)
     before = tree(live_runs_here)
-    assert command("status").returncode == 0
+    assert ask("status").status == 0
     assert tree(live_runs_here) == before
 
 
@@ -120,14 +121,14 @@ def test_a_pipe_in_the_place_of_a_file_holds_nobody_up(name):
     path = dead()
     (path / name).unlink()
     os.mkfifo(path / name)
-    assert command("status").returncode == 0
+    assert ask("status").status == 0
 
 
 def test_a_base_directory_that_is_a_link_is_refused_with_a_sentence(tmp_path, live_runs_here):
     (tmp_path / "documents").mkdir(mode=0o700)
     (live_runs_here / "haploop").symlink_to(tmp_path / "documents")
-    answer = command("status")
-    assert answer.returncode == 2
+    answer = ask("status")
+    assert answer.status == 2
     assert answer.stderr.startswith(f"{live_runs_here / 'haploop'} must be a directory, not a link or a file;")
     assert "Traceback" not in answer.stderr
 
@@ -147,8 +148,8 @@ def test_a_base_directory_that_cannot_be_used_is_a_sentence_and_no_run_is_starte
         monkeypatch.setenv("XDG_RUNTIME_DIR", "/proc")
         words = "The directory of live runs /proc/haploop cannot be made: "
     for arguments in (["status"], ["run", str(SCENE), "--out", str(tmp_path / "out")]):
-        answer = command(*arguments)
-        assert answer.returncode == 2
+        answer = ask(*arguments)
+        assert answer.status == 2
         assert words in answer.stderr
         assert "Traceback" not in answer.stderr
     assert not (tmp_path / "out").exists()

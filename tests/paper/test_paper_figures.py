@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from shutil import copytree
 from typing import Any
 
 import numpy as np
@@ -124,20 +125,17 @@ def test_answers_of_another_program_or_another_call_do_not_count(
 def test_a_run_that_was_stopped_and_goes_on_writes_the_same_pages_as_one_that_was_not(tmp_path: Path) -> None:
     """Stopped after part of the answers of a figure, and after whole figures: half the answers are taken away."""
     pages: list[list[str]] = []
-    for folder in ("whole", "stopped"):
-        out = tmp_path / folder
-        out.mkdir()
-        for number in STOPPED:
-            check(number, out)
-        if folder == "stopped":
-            answers = sorted((out / "answers").rglob("*"))
-            for file in answers[::2]:
-                if file.is_file():
-                    file.unlink()
-            for file in out.glob("figure_*"):
-                file.unlink()
-            for number in STOPPED:
-                make(number, out)
+    whole, stopped = tmp_path / "whole", tmp_path / "stopped"
+    whole.mkdir()
+    for number in STOPPED:
+        check(number, whole)
+    copytree(whole, stopped)
+    answers = [file for file in sorted((stopped / "answers").rglob("*")) if file.is_file()]
+    for file in (*answers[::2], *stopped.glob("figure_*")):
+        file.unlink()
+    for number in STOPPED:
+        make(number, stopped)
+    for out in (whole, stopped):
         write_pages(made(out), out)
         pages.append([page(made(out)), claims_page(made(out))])
     assert pages[0] == pages[1]
