@@ -14,6 +14,7 @@ import aiohttp
 import pytest
 
 from helpers.live.browsing import Tab, stream, to_its_end
+from helpers.live.in_process import ask
 from helpers.live.launched import HAPLOOP, PATIENCE_S, SCENE, Launched, alive, command, processes, wait_for
 from helpers.live.live_run import going, undisturbed
 
@@ -63,8 +64,8 @@ def test_a_taken_port_is_named(launched):
         other.bind(("127.0.0.1", 0))
         other.listen()
         port = other.getsockname()[1]
-        answer = command("view", "--no-browser", "--port", str(port))
-    assert answer.returncode == 2
+        answer = ask("view", "--no-browser", "--port", str(port))
+    assert answer.status == 2
     assert f"Port {port} of 127.0.0.1 cannot be used" in answer.stderr
 
 
@@ -77,8 +78,8 @@ def test_a_taken_port_is_named(launched):
     ],
 )
 def test_wrong_use_of_view_says_what_was_expected(words, sentence):
-    answer = command("view", "--no-browser", *words)
-    assert answer.returncode == 2
+    answer = ask("view", "--no-browser", *words)
+    assert answer.status == 2
     assert sentence in answer.stderr
 
 
@@ -241,11 +242,11 @@ def stopped_until(launched, tmp_path, tick: int, *overrides: str, **options: Any
 
 @pytest.mark.slow
 def test_a_stopped_viewer_costs_the_run_nothing_and_is_told_what_it_missed(launched, tmp_path):
-    """At free pace; blocks of 10 ticks fill its queues in no time."""
-    stopped_until(launched, tmp_path, 35_000, "duration=40", "run.block_ticks=10", "run.log=ticks")
+    """At free pace; blocks of a tick fill its queues in no time."""
+    stopped_until(launched, tmp_path, 2200, "duration=2.5", "run.block_ticks=1", "run.log=ticks")
 
 
 @pytest.mark.slow
 def test_a_viewer_stopped_in_real_time_costs_the_run_nothing(launched, tmp_path):
     """Blocks of a tick fill its queues in two seconds."""
-    stopped_until(launched, tmp_path, 2200, "duration=5", "run.block_ticks=1", pace=1.0)
+    stopped_until(launched, tmp_path, 2200, "duration=2.5", "run.block_ticks=1", pace=1.0)
