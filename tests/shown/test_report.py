@@ -15,8 +15,9 @@ from haploop.controller.dissipation import Element, Motion, registry
 from haploop.launch.runs.start import prepare, run
 from haploop.protocol.quantity import Quantity
 from haploop.tools.render.cause import cause
+from haploop.tools.render.listings import plugins_table, status_table
 from haploop.tools.render.progress import ProgressLine
-from haploop.tools.render.report import plugins_table, status_table, summary_table
+from haploop.tools.render.report import summary_table
 from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount, fixed
 from helpers.shown import row, shown

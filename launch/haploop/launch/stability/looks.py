@@ -8,6 +8,7 @@ import numpy as np
 
 from haploop.launch.stability.decide import HAND_MOVES, NOISE, Finding, decide
 from haploop.launch.stability.swing import Pushed, measure
+from haploop.protocol.scene.hand_force import constant_from_s
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.walls.wall import Wall
@@ -61,11 +62,7 @@ def is_struck(found: Finding) -> bool:
 
 def moved_beside(scene: Scene, from_s: float) -> list[str]:
     """Returns what moves a run beside its loop after a time in s: hand, noise, both, or none."""
-    force = scene.hand and scene.hand.force
-    at_rest_s = {"ramp": "rise_time", "minimum-jerk": "rise_time", "step": "at"}
-    still = force is None or force.kind == "constant"
-    if force is not None and force.kind in at_rest_s:
-        still = getattr(force, at_rest_s[force.kind]) <= from_s
+    still = constant_from_s(scene.hand.force if scene.hand else None) <= from_s
     is_noisy = scene.noise is not None or (scene.accelerometer is not None and scene.accelerometer.noise_density > 0.0)
     unmodelled = scene.hand is not None and scene.hand.kind == "unmodelled"
     return [HAND_MOVES] * (unmodelled or not still) + [NOISE] * is_noisy

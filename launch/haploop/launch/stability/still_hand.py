@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from copy import deepcopy
 from dataclasses import dataclass, replace
 
@@ -10,7 +11,7 @@ import numpy as np
 from haploop.controller.controller import Controller
 from haploop.plant.motion.hand_force import HandForce
 from haploop.plant.plant import Plant
-from haploop.protocol.scene.hand_force import Constant
+from haploop.protocol.scene.hand_force import Constant, constant_from_s
 from haploop.protocol.scene.scene import Hand, Scene
 from haploop.protocol.ticks import Timebase
 
@@ -19,7 +20,6 @@ PUSH_S = 0.05
 # A force of the hand is a hold where it lasts so long; of a run that many seconds at its end are looked through.
 _HOLD_S, _LATEST_S = 0.25, 60.0
 # Kinds of force that stay where they came to.
-_STAY = ("constant", "ramp", "step", "minimum-jerk")
 # A hold that is harder by less than this is the same.
 _HARDER = 1.2
 
@@ -131,7 +131,7 @@ def harder_hold(scene: Scene, time: Timebase, last: int, hold_N: float) -> float
     It is the largest mean over a quarter of a second: a hand that trembles faster holds what it does on average.
     """
     table = scene.hand.force if scene.hand else None
-    if table is None or table.kind in _STAY:
+    if math.isfinite(constant_from_s(table)):
         return None
     n, ticks = time.steps_per_tick, max(1, round(_HOLD_S * time.control_rate))
     first = max(0, last - round(_LATEST_S * time.control_rate))

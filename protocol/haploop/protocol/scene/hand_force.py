@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 from haploop.protocol.quantity import si
@@ -64,3 +65,15 @@ class Trace(Table):
 
 
 HandForce = Constant | Ramp | Step | Sine | MinimumJerk | Trace
+
+
+def constant_from_s(force: HandForce | None) -> float:
+    """Returns the time in s from which on a hand's force stays the same: infinite of a sine and of a trace."""
+    match force:
+        case None | Constant():
+            return 0.0
+        case Step(at=at):
+            return at
+        case Ramp(rise_time=rise_time) | MinimumJerk(rise_time=rise_time):
+            return rise_time
+    return math.inf

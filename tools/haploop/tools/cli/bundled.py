@@ -18,7 +18,7 @@ def scenes(json: Json = False) -> None:
     if json:
         print_json(listed)
         return
-    from haploop.tools.render.report import bundled_table
+    from haploop.tools.render.listings import bundled_table
     from haploop.tools.render.terminal import console
 
     console().print(bundled_table(listed))

@@ -39,7 +39,7 @@ def status(run: Run = None, json: Json = False) -> None:
     elif not runs:
         print("No run is live.")
     else:
-        from haploop.tools.render.report import status_table
+        from haploop.tools.render.listings import status_table
         from haploop.tools.render.terminal import console
 
         for identity, data in answers.items():

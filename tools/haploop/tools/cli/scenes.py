@@ -76,7 +76,7 @@ def plugins(plugin: Plugin = None, json: Json = False) -> None:
     if json:
         print_json({kind: _parameters(element) for kind, element in kinds.items()})
         return
-    from haploop.tools.render.report import plugins_table
+    from haploop.tools.render.listings import plugins_table
     from haploop.tools.render.terminal import console
 
     console().print(plugins_table(kinds))

@@ -1,26 +1,21 @@
-"""Reports on the terminal: the summary of a run, the state of live runs, the kinds of element."""
+"""Reports on the terminal: the summary of a run, and what a judge found."""
 
 from __future__ import annotations
 
-import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from haploop.launch.processes.foreign import described
 from haploop.launch.scene.mistakes import counted
 from haploop.tools.render.cause import SWINGS, cause
-from haploop.tools.render.terminal import console, make_facts, make_table, seen, told, verdict_style
+from haploop.tools.render.terminal import console, make_facts, make_table, told, verdict_style
 from haploop.tools.render.units import amount, fixed, parameters, spring
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from rich.console import RenderableType
     from rich.table import Table
 
-    from haploop.controller.dissipation import Element
     from haploop.launch.stability.decide import Finding
     from haploop.logger.summary import Summary
-    from haploop.protocol.quantity import Quantity
     from haploop.protocol.transport.wire import Message
 
 _ITS_WORD = "That the {} does what the scene says is its own word; haploop replay holds it against the scene."
@@ -81,7 +76,7 @@ def summary_table(summary: Summary) -> RenderableType:
         parts.append(Text(f"ended early: {summary['ended']}", style="bold red"))
     told_too = [*summary.get("not_made", ()), *filter(None, [summary["energy"].get("balance")])]
     parts += [Text(sentence, style="bold yellow") for sentence in told_too]
-    parts += [Text(_ITS_WORD.format(words.split()[0])) for words, _ in _programs(summary)]
+    parts += [Text(_ITS_WORD.format(words.split()[0])) for words, _ in program_rows(summary)]
     control_rate = summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
     return Group(*parts, make_facts(_key_figures(summary)), _books(summary["energy"], control_rate))
 
@@ -93,8 +88,8 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
         ran += f", in {amount(summary['wall_s'], 's')} ({fixed(summary['real_time_factor'])} times real time)"
     figures = [
         ("ran", ran),
-        *_lateness(summary),
-        *_programs(summary),
+        *lateness_rows(summary),
+        *program_rows(summary),
         ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak at its end"),
     ]
     for key, (words, after) in _OF_FORCE.items():
@@ -121,7 +116,7 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     return figures
 
 
-def _lateness(of: Summary) -> list[tuple[str, str]]:
+def lateness_rows(of: Summary) -> list[tuple[str, str]]:
     """Returns how late the ticks of a run in real time were, or the answers to its device; nothing for any other."""
     if not (late := of.get("lateness")):
         return []
@@ -231,77 +226,6 @@ def rests(found: Summary) -> bool:
     return found["width_m"] < 1e-9
 
 
-def status_table(data: Message) -> RenderableType:
-    """Makes the report of a live run: progress, verdict so far, and the lag of every node."""
-    from rich.console import Group
-    from rich.text import Text
-
-    rate, pace = data["control_rate"], data.get("pace", "free")
-    unpaced = {"free": "as fast as it goes", "plant": "by the plant's own time"}
-    at_pace = unpaced[pace] if isinstance(pace, str) else f"at pace {pace:g}"
-    state = ("paused", "bold yellow") if data["paused"] else ("running", "bold green")
-    where = f"  {data['tick'] / rate:g} s of {data['end'] / rate:g} s, tick {data['tick']} of {data['end']}, {at_pace}"
-    head = Text.assemble((data.get("run", ""), "bold"), "  " if data.get("run") else "", data["title"])
-    parts: list[RenderableType] = [head, Text.assemble(state, where)]
-    if status := data.get("status"):
-        word = seen(status["verdict"])
-        looks = f" so far, oscillation {amount(status['oscillation_m'], 'm')} peak to peak"
-        parts.append(Text.assemble((word, verdict_style(word)), looks))
-    parts += [Text(f"{words} {late}") for words, late in _lateness(data)]
-    parts += [Text(reason, "yellow") for reason in data.get("refused", {}).values()]
-    parts += [Text(f"{words}: {what}") for words, what in _programs(data)]
-    return Group(*parts, _nodes(data["nodes"], rate))
-
-
-def _programs(data: Message) -> list[tuple[str, str]]:
+def program_rows(data: Message) -> list[tuple[str, str]]:
     """Returns role and program of what is not haploop's own, of a status or a summary."""
     return [(f"{role} not haploop's own", described(p)) for role, p in data.get("programs", {}).items() if not p["own"]]
-
-
-def _nodes(nodes: list[Message], control_rate: float) -> Table:
-    from rich.text import Text
-
-    numbers = ("pid", "tick", "behind", "skipped")
-    table = make_table("node", *numbers[:3], "waits for", "skipped", numbers=numbers, unbroken=("node",))
-    for node in nodes:
-        behind, skipped = node["behind_ticks"], node.get("skipped_ticks", 0)
-        ticks = f"{behind} tick{'s' * (behind != 1)}"
-        lag = f"{ticks}, {amount(behind / control_rate, 's')}" if behind else "–"
-        skips = "–" if node.get("lossless", True) else Text(f"{skipped} ticks", "yellow" if skipped else "")
-        table.add_row(Text(node["role"]), str(node["pid"]), str(node["tick"]), lag, node["waits_for"] or "–", skips)
-    return table
-
-
-def bundled_table(listed: Mapping[str, Mapping[str, str]]) -> Table:
-    """Makes the table of what comes with haploop: folder, name, and what it is."""
-    table = make_table("", "name", "what it is", unbroken=("", "name"))
-    for folder, files in listed.items():
-        for number, (name, about) in enumerate(files.items()):
-            table.add_row("" if number else folder, name, about)
-        table.add_section()
-    return table
-
-
-def plugins_table(kinds: Mapping[str, type[Element]]) -> Table:
-    """Makes the table of element kinds: purpose, parameters with unit, bounds and default."""
-    from rich.text import Text
-
-    table = make_table("kind", "what it does", "parameters", unbroken=("kind",))
-    for kind, element in kinds.items():
-        about = (element.__doc__ or "").strip().partition("\n")[0]
-        lines = [_parameter(name, *declared) for name, declared in element.parameters().items()]
-        # As text: a formula's v[k] is no markup.
-        table.add_row(kind, Text(about), Text("\n".join(lines) or "–"))
-        table.add_section()
-    return table
-
-
-def _parameter(name: str, quantity: Quantity, default: Any) -> str:
-    words = [f"{name} ({quantity.unit})" if quantity.unit else name]
-    words += [" or ".join(map(quantity.text, quantity.choices))] if quantity.choices else []
-    for bound in ("at_least", "above", "at_most", "below"):
-        value = getattr(quantity, bound)
-        words += [f"{bound.replace('_', ' ')} {value:g}"] if value is not None else []
-    if default is not dataclasses.MISSING:
-        words.append(f"default {quantity.text(default) if quantity.choices else format(default, 'g')}")
-    return ", ".join(words)

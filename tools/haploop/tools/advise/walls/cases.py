@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from haploop.plant.chain.chain import Chain
-from haploop.protocol.scene.hand_force import Constant, Sine
+from haploop.protocol.scene.hand_force import Constant, Sine, constant_from_s
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Hand, Scene, Wall
 from haploop.tools.advise.walls.corners import Corner, Ranges, corner_words, design, drawn, scale_quantities
@@ -31,7 +31,6 @@ MOST_DELAY_S, ROUND_TRIPS = 0.5, 60
 # So does one so many periods of device and hand without a wall, where that swings, being damped by less than this share
 # of the critical; no run is longer than so many usual ones for that.
 PERIODS, _DAMPED, _SLOWEST = 22, 0.3, 10.0
-_STAYS = (None, "constant", "ramp", "step", "minimum-jerk")
 # An attack takes so many of the hardest corners whole; of other corners about so many cases, and so many points within.
 _WHOLE, _CORNERS, _POINTS = 6, 280, 160
 # Those take what they are attacked by in steps of this, which has no divisor in common with how many there are.
@@ -85,10 +84,10 @@ def make_loop(scene: Scene, has_task: bool, share: float = OF_THE_ACTUATOR) -> S
     That of a task that stays, less what the hand's own spring takes; 1 N without one, or a share of what the actuator
     gives where that is less.
     """
-    kind, most_N = value_at(scene, "hand.force.kind"), value_at(scene, "actuator.saturation")
+    most_N = value_at(scene, "actuator.saturation")
     force_N = min(PRESS_N, share * (math.inf if most_N is None else most_N))
     hand = scene.hand or Hand()
-    if has_task and scene.wall and kind in _STAYS[1:]:
+    if has_task and scene.wall and hand.force and math.isfinite(constant_from_s(hand.force)):
         inward = -1.0 if scene.wall.occupies == "below" else 1.0
         net_N = inward * (value_at(scene, "hand.force.value") + hand.stiffness * (hand.rest - scene.wall.position))
         force_N = net_N if net_N > 0.0 else force_N
