@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,11 @@ from typer.testing import CliRunner
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.bundled import of_name
 from haploop.tools.cli.app import app
+from haploop.tools.cli.runs_beside import difference_table
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.difference import Parting, difference, unlike_keys
 from haploop.tools.figure.overlay import MOST_RUNS, labels, make_overlay
-from helpers.shown import artists
+from helpers.shown import artists, row, shown
 
 PNG = b"\x89PNG"
 
@@ -121,6 +123,18 @@ def test_an_overlay_draws_every_run_with_its_name_and_what_differs(runs):
     drawn = artists(figure, "energy")[0].get_ydata()
     taken_J = given[0].books()[-1].true_J
     assert drawn[-1] / drawn.min() == pytest.approx(taken_J[-1] / taken_J.min())
+
+
+def test_beside_a_verdict_its_provisos_are_told_in_full_in_overlay_and_table(runs):
+    held, other = data(runs, "a", "swapped")
+    found = {"stability": {"provisos": ["only friction holds it"]}}
+    held = replace(held, every_step=False, summary=held.summary | found)
+    numbers = [text.get_text() for text in artists(make_overlay([held, other]), "numbers")]
+    assert numbers[0].startswith("only friction holds it; oscillation")
+    assert [text.endswith("; position as measured") for text in numbers] == [True, False]
+    table = shown(difference_table(difference(held, other)), 140)
+    assert row(table, "provisos") == ["only friction holds it", "–"]
+    assert len(row(table, "trajectory hash")[0]) == 16
 
 
 def test_plot_of_several_runs_writes_one_figure_and_refuses_what_it_cannot_draw(runs, tmp_path):

@@ -28,6 +28,8 @@ _WORDS = {
     "frequency_Hz": ("  at", "Hz"),
     "trajectory_sha256": ("trajectory hash", ""),
 }
+# Letters of a hash that are enough to tell two apart.
+_HASH_LETTERS = 16
 # Logged columns of the controller in words.
 _COLUMNS = {
     "x": "the measured position",
@@ -103,6 +105,7 @@ def difference_table(found: Difference) -> RenderableType:
     for name, pair in found.results.items():
         words, unit = _WORDS[name]
         told = [_result(value, unit) for value in pair]
+        told = [text[:_HASH_LETTERS] for text in told] if name == "trajectory_sha256" else told
         styles = [verdict_style(text) if name == "verdict" else "" for text in told]
         table.add_row(words, *(Text(text, style) for text, style in zip(told, styles, strict=True)))
     table.add_section()
@@ -129,4 +132,4 @@ def _result(value: Any, unit: str) -> str:
 
     if value is None:
         return "–"
-    return amount(value, unit) if unit else f"{value}"[:16]
+    return amount(value, unit) if unit else f"{value}"

@@ -175,6 +175,11 @@ class RunData:
         )
 
     @property
+    def as_measured(self) -> str:
+        """Returns " as measured" where positions are those that the controller read, "" where they are true."""
+        return "" if self.every_step else " as measured"
+
+    @property
     def ticks_s(self) -> Floats:
         return self.controller["timestamp"]
 

@@ -53,8 +53,7 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
         look = {"fontsize": style.SMALL + 1, "color": style.GREY, "transform": ax.transAxes}
         ax.text(0.5, 0.5, text, ha="center", va="center", **look)
         return
-    measured = "" if run.every_step else " as measured"
-    style.dress(ax, title, f"penetration{measured} (mm)", "force out of the wall (N)")
+    style.dress(ax, title, f"penetration{run.as_measured} (mm)", "force out of the wall (N)")
     early_depth, early_force = force_position_loop(run, run.early_s())
     depth, force = force_position_loop(run, span_s)
     early = {"color": style.EARLY, "linewidth": 0.8, "label": "first second of contact", "gid": "early"}
@@ -88,7 +87,7 @@ def draw_momentum(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
     ]
     loops = [loop for loop in loops if len(loop[2][0])]
     if not loops:
-        about = "position (mm)\n(no virtual inertia, so no momentum loop)"
+        about = f"position{run.as_measured} (mm)\n(no virtual inertia, so no momentum loop)"
         style.dress(ax, "Velocity against position", about, "velocity (m/s)")
         for stretch, colour, name in ((run.early_s(), style.EARLY, "early"), (span_s, style.INK, "motion")):
             x, v = within(stretch, run.t_s, run.x_m, run.v_m_s)

@@ -122,9 +122,11 @@ def _head(header: Figure | SubFigure, run: RunData, label: str, y: float, colour
 def _numbers(run: RunData) -> str:
     if not run.summary:
         return key_numbers(run)[0]
-    frequency = run.summary.get("stability", {}).get("frequency_Hz")
-    words = f"oscillation {amount(run.summary['window']['oscillation_m'], 'm')} at its end"
-    return f"{words}; pushed, {amount(frequency, 'Hz')}" if frequency else words
+    found = run.summary.get("stability", {})
+    measured = f"position{run.as_measured}" if run.as_measured else ""
+    swing = f"oscillation {amount(run.summary['window']['oscillation_m'], 'm')} at its end"
+    pushed = f"pushed, {amount(found['frequency_Hz'], 'Hz')}" if found.get("frequency_Hz") else ""
+    return "; ".join(filter(None, [", ".join(found.get("provisos", ())), swing, pushed, measured]))
 
 
 def _positions(ax: Axes, runs: Sequence[RunData], span_s: tuple[float, float], title: str) -> None:

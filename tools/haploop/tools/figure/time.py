@@ -31,7 +31,7 @@ def position_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: s
     """Draws position over time with the wall shaded, fitted to the motion in contact if the approach dwarfs it."""
     inside = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
     t, x_mm = run.t_s[inside], np.stack([run.x_m, *run.bodies_m.values()])[:, inside] * MM
-    name = ("motor" if "tip" in run.bodies_m else "device") + ("" if run.every_step else " as measured")
+    name = ("motor" if "tip" in run.bodies_m else "device") + run.as_measured
     line(ax, t, x_mm[0], name, style.INK, gid="position")
     for body, position in zip(run.bodies_m, x_mm[1:], strict=True):
         line(ax, t, position, body, style.OF_THE_PLANT[body], linewidth=1.0, gid=body)
