@@ -9,6 +9,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -138,6 +139,29 @@ def test_machine_code_of_other_formulas_is_not_taken_for_that_of_these(tmp_path:
         there.write_text(source.replace("dx = end - start", formula), encoding="utf-8")
         found.append(MachineCode(str(there), (work,)).kept)
     assert found[0] == found[2] != found[1]
+
+
+def test_where_several_would_compile_at_once_one_does_and_the_others_load_what_it_made(tmp_path: Path) -> None:
+    pytest.importorskip("numba")
+    (tmp_path / "work.py").touch()
+    code = MachineCode(str(tmp_path / "work.py"), ())
+    compiles, loaded, found = Event(), Event(), []
+
+    def compiling() -> None:
+        compiles.set()
+        loaded.wait(0.3)  # who does not wait loads meanwhile
+
+    def loading() -> None:
+        found.append(code.is_made())
+        loaded.set()
+
+    first = Thread(target=code.try_out, args=(compiling,))
+    first.start()
+    compiles.wait()
+    assert not code.is_made()
+    code.try_out(loading)
+    first.join()
+    assert found == [True]
 
 
 def test_without_numba_a_batch_is_booked_by_numpy(monkeypatch: pytest.MonkeyPatch) -> None:

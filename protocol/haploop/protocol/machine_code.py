@@ -5,10 +5,12 @@ The same operations in the same order give the same bits as Python and NumPy.
 
 from __future__ import annotations
 
+import fcntl
 import os
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 from shutil import rmtree
@@ -17,6 +19,8 @@ from typing import Any
 
 # How the name of the file begins by which it is known that the machine code beside it is whole.
 MADE = "made-"
+# To compile takes 16 s, or a minute on a busy machine; a process that was stopped meanwhile holds nobody up for longer.
+_PATIENCE_S = 120.0
 
 
 class MachineCode:
@@ -66,13 +70,28 @@ class MachineCode:
         Raises whatever numba does; the next process then finds no machine code kept, which may be damaged.
         """
         try:
-            function()
+            with self._one_at_a_time():
+                function()
+                with suppress(OSError, AttributeError):  # without the mark, nodes do without the loops
+                    if self.kept and not self.is_made():
+                        self._mark.touch()
         except Exception:
             rmtree(self.kept, ignore_errors=True)
             raise
-        with suppress(OSError, AttributeError):  # without the mark, nodes do without the loops
-            if self.kept and not self.is_made():
-                self._mark.touch()
+
+    @contextmanager
+    def _one_at_a_time(self) -> Iterator[None]:
+        """Has one process compile where several would, as workers of a sweep; the others load what it made."""
+        with ExitStack() as held:
+            with suppress(OSError, AttributeError):  # without a lock each compiles
+                if self.kept and not self.is_made():
+                    Path(self.kept).mkdir(parents=True, exist_ok=True)
+                    directory = os.open(self.kept, os.O_RDONLY)
+                    held.callback(os.close, directory)
+                    _wait_for(directory)
+                    if self.is_made():
+                        held.close()
+            yield
 
     def is_made(self) -> bool:
         """Tells whether the loops were compiled before, for this processor, so that to load them is a matter of 1 s."""
@@ -87,3 +106,12 @@ class MachineCode:
         processor = registry.cpu_target.target_context.codegen().magic_tuple()
         made_for = numba.__version__, sys.implementation.cache_tag, processor
         return Path(self.kept, MADE + sha256(repr(made_for).encode()).hexdigest()[:16])
+
+
+def _wait_for(directory: int) -> None:
+    give_up = time.monotonic() + _PATIENCE_S
+    while time.monotonic() < give_up:
+        with suppress(BlockingIOError):
+            fcntl.flock(directory, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        time.sleep(0.05)
