@@ -83,8 +83,7 @@ def test_sixty_more_drawn_scenes_do(decade):
 @pytest.mark.parametrize(
     ("path", "delay"),
     [
-        *((path, 20) for path in SCENES[:2]),
-        *(pytest.param(path, 20, marks=pytest.mark.slow) for path in SCENES[2:]),
+        *(pytest.param(path, 20, marks=[pytest.mark.slow] * (path.stem != "tap")) for path in SCENES),
         *(pytest.param(path, (0, 3, 10, 25, 50)[i % 5], marks=pytest.mark.slow) for i, path in enumerate(SCENES)),
     ],
     ids=lambda value: value.stem if isinstance(value, Path) else None,
