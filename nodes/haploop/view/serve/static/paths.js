@@ -78,17 +78,21 @@ let buffer = new ArrayBuffer(0);
 
 /** Draw strips as wide as a line, and dashed; where they cover the same heights again and again, faintly within edges. */
 export function drawStrips(u, found, { colour: name, width, dash = [] }) {
-  const [left, top, wide, tall] = [u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height].map(Math.round);
+  const pen = Math.max(1, Math.round(width * devicePixelRatio));
+  const [left, wide] = [u.bbox.left, u.bbox.width].map(Math.round);
+  const [low, high, mean] = heights(found);
+  const top = Math.max(Math.round(u.bbox.top), Math.floor(low - pen));
+  const tall = Math.min(Math.round(u.bbox.top + u.bbox.height), Math.ceil(high + pen)) - top;
+  if (!(tall > 0)) return;
   if (buffer.byteLength < 4 * wide * tall) buffer = new ArrayBuffer(4 * wide * tall);
   const pixels = new Uint32Array(buffer, 0, wide * tall).fill(0);
   const column = (x, from, to, pixel) => {
     const end = Math.min(tall, to) * wide;
     for (let at = Math.max(0, from) * wide + x; at < end; at += wide) pixels[at] = pixel;
   };
-  const pen = Math.max(1, Math.round(width * devicePixelRatio));
   const pattern = dash.flatMap((length, i) => Array(length).fill(i % 2 === 1));
   const [full, faint] = [1, FAINT].map((alpha) => pixelOf(name, alpha));
-  const isFaint = coversTheSame(found);
+  const isFaint = mean > FILLED * (high - low);
   for (let i = 0; i < found.length; i += 4) {
     const from = Math.round(found[i + 2] - top - pen / 2);
     const to = Math.max(from + pen, Math.round(found[i + 3] - top + pen / 2));
@@ -108,15 +112,15 @@ export function drawStrips(u, found, { colour: name, width, dash = [] }) {
   u.ctx.drawImage(sheet, 0, 0, wide, tall, left, top, wide, tall);
 }
 
-/** Whether strips fill much of what they cover together. */
-function coversTheSame(found) {
+/** Highest and lowest pixel of strips, and their mean height. */
+function heights(found) {
   let [low, high, sum] = [Infinity, -Infinity, 0];
   for (let i = 0; i < found.length; i += 4) {
     if (found[i + 2] < low) low = found[i + 2];
     if (found[i + 3] > high) high = found[i + 3];
     sum += found[i + 3] - found[i + 2];
   }
-  return (4 * sum) / found.length > FILLED * (high - low);
+  return [low, high, (4 * sum) / found.length];
 }
 
 /** A colour of the page as the number of a pixel. */
