@@ -76,6 +76,9 @@ def scene(tmp_path: Path) -> Path:
     return tmp_path / "all.toml"
 
 
+WINDOW = ("--set", "run.verdict=window")
+
+
 def ran(path: Path, text: str, *options: str) -> tuple[dict[str, Any], Any]:
     """Summary and log of a run of this scene."""
     path.mkdir()
@@ -182,7 +185,7 @@ def test_the_residual_stays_below_the_last_bits_also_for_bodies_in_a_row(tmp_pat
         ("row", exact + CABLE),
         ("rubbing", exact + CABLE + "[friction]\nkinetic = 0.1"),
     ):
-        summary, _ = ran(tmp_path / name, text, "--in-process")
+        summary, _ = ran(tmp_path / name, text, "--in-process", *WINDOW)
         assert summary["energy"]["residual_J"] < 1e-12
         assert summary["energy"]["gravity_work_J"] > 1e-3
 
@@ -212,6 +215,6 @@ print(json.dumps([abs(x_m("kutta-3-8", rate) - x_m("exact", rate)) for rate in (
 def test_the_estimator_follows_a_constant_acceleration_with_its_known_lag(tmp_path: Path) -> None:
     """The error of v is constant then, so that v rises as fast as the device falls."""
     text = FALL + '[velocity]\nestimator = "alpha-beta"\nalpha = 0.5\nbeta = 0.2\n'
-    _, log = ran(tmp_path / "fall", text, "--in-process")
+    _, log = ran(tmp_path / "fall", text, "--in-process", *WINDOW)
     v = log["/controller"]["v"]
     assert np.diff(v)[-100:] == pytest.approx(np.full(100, -9.81e-3), rel=1e-9)
