@@ -137,7 +137,7 @@ def test_pages_that_come_go_and_say_nothing_leave_the_bits_of_the_run_alone(tmp_
         await tab.phase("ended")
         assert tab.snapshots > 10
         reading.cancel()
-        assert heard.count(aiohttp.WSMsgType.BINARY) == 2, "no more than two before the page says that it has drawn"
+        assert heard.count(aiohttp.WSMsgType.BINARY) == 4, "no more than four before the page says that it has drawn"
         return tab.state["skipped_ticks"]
 
     with going(tmp_path, "duration=3", pauses=(100,)) as run:
