@@ -26,8 +26,8 @@ _UNKNOWN_KEY = (
     "Copy client.key_secret from its keys."
 )
 _OTHER_KEYS = (
-    "The program at {} broke the handshake off: clock.key is not that of its keys, or it is no run of haploop. "
-    "Copy clock.key and client.key_secret from the keys of this run."
+    "The program at {} broke the handshake off: clock.key is not that of its keys, or it has no keys, or it is no run "
+    "of haploop. Copy clock.key and client.key_secret from the keys of this run; leave out --keys if it has none."
 )
 _NEEDS_KEYS = "The run at {} is guarded by keys, or it is no run of haploop; name a copy of its keys with --keys."
 _HAS_NO_KEYS = "The run at {} has no keys, or it is no run of haploop; leave out --keys if you meant it."
