@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from haploop.protocol.scene.hand_force import Sine, Trace
+from haploop.protocol.scene.hand_force import Sine, Trace, constant_from_s
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene, Wall, accelerometer_is_used, hand_is_unmodelled
 from haploop.protocol.walls.registry import make_wall
@@ -106,8 +106,7 @@ def _reach_of_chain_m(scene: Scene) -> float:
     sum of steps.
     """
     hand, device = scene.hand, scene.device
-    grows = hand and hand.force and hand.force.kind in ("constant", "ramp", "step", "minimum-jerk")
-    if hand is None or not grows or not hand.stiffness or device.velocity or device.position != hand.rest:
+    if hand is None or math.isinf(constant_from_s(hand.force)) or not hand.stiffness or device.velocity or device.position != hand.rest:
         return math.inf
     give = [spring.stiffness for spring in (scene.transmission, hand.grip) if spring]
     force_N, ground = _most_force_N(scene), hand.stiffness
