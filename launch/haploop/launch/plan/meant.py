@@ -106,7 +106,9 @@ def _reach_of_chain_m(scene: Scene) -> float:
     sum of steps.
     """
     hand, device = scene.hand, scene.device
-    if hand is None or math.isinf(constant_from_s(hand.force)) or not hand.stiffness or device.velocity or device.position != hand.rest:
+    if hand is None or hand.force is None or math.isinf(constant_from_s(hand.force)):
+        return math.inf
+    if not hand.stiffness or device.velocity or device.position != hand.rest:
         return math.inf
     give = [spring.stiffness for spring in (scene.transmission, hand.grip) if spring]
     force_N, ground = _most_force_N(scene), hand.stiffness
