@@ -142,6 +142,9 @@ class Seat:
             if self._telemetry.is_due():
                 self._flush()
                 self._clock.listen()
+        if self._owns_time:  # answers that were due before the end, and have not come
+            for tick in range(self._answered, self._tick - self._delay // self._n):
+                self._schedule.answered(tick, True)
         self._loop.send(LAST, self._tick)
         self._flush()
         self._telemetry.end(self._tick, reason)
