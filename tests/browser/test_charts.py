@@ -7,25 +7,10 @@ from playwright.sync_api import expect
 
 from helpers.live.browser import IN_BOTH, seen, settled
 from helpers.live.stand_in import RUNS
-from oracles.snapshots import contact, snapshot, table
+from oracles.snapshots import contact, positions, snapshot, table
 
 NAN = math.nan
 ROWS = 400
-
-
-@pytest.fixture
-def page(stand_in, open_page):
-    stand_in.state()
-    page = open_page(stand_in.url)
-    expect(page.locator("#phase")).to_have_text("running")
-    return page
-
-
-def positions(x, wall=None):
-    columns = [("x", "m", "position", x)]
-    if wall:
-        columns.append(("wall", "m", "wall", [wall] * len(x)))
-    return snapshot(0.0, 2.0, table("position", 0.0, 2.0 / (len(x) - 1), *columns))
 
 
 @IN_BOTH

@@ -140,8 +140,7 @@ def test_a_plant_that_diverges_ends_the_run_at_the_tick_at_which_our_own_does_th
     """What the plant sends last is more than a socket of the system buffers, and longer on its way than a second."""
     wild = ("dissipation.0.damping=60", "diverged_beyond=0.07")
     held = ("run.block_ticks=1000", "run.deadline=30", "event=[{at=0.01, pause=true}]")
-    words = seat("plant", in_node("plant.js"))
-    run = running(*words, scene=SCENES / "fig6b.toml", sets=(*wild, *held), pace=FREE)
+    run = running(*seat("plant", in_node("plant.js")), scene=SCENES / "fig6b.toml", sets=(*wild, *held), pace=FREE)
     run.reaches(10)
     run.send("logger", signal.SIGSTOP)
     run.ask("resume")

@@ -80,3 +80,11 @@ def contact(from_s: float = 0.0, to_s: float = 2.0, rows: int = 1000, wall_m: fl
             ("p.1", "kg m/s", "element 1: unidirectional-inertia", [0.01 * speed for speed in v[recent]]),
         ),
     )  # fmt: skip
+
+
+def positions(x, wall=None):
+    """Returns a snapshot of 2 s of position, m, and of a wall that stands still."""
+    columns = [("x", "m", "position", x)]
+    if wall:
+        columns.append(("wall", "m", "wall", [wall] * len(x)))
+    return snapshot(0.0, 2.0, table("position", 0.0, 2.0 / (len(x) - 1), *columns))
