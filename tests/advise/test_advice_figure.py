@@ -10,9 +10,10 @@ from haploop.tools.advise.advice import Advice, Changed
 from haploop.tools.advise.families import BOTH, DAMPING, NOTHING, UNIDIRECTIONAL
 from haploop.tools.advise.figure import figure_of
 from haploop.tools.advise.known import Formula, Published
-from haploop.tools.advise.search import Found
+from haploop.tools.advise.search import Found, fallen
 from haploop.tools.advise.walls.limit import Limit
-from haploop.tools.advise.withstand import Best
+from haploop.tools.advise.walls.store import Failure
+from haploop.tools.advise.withstand import Best, Rival
 
 
 def limit(stiffness_N_m: float) -> Limit:
@@ -77,3 +78,11 @@ def test_every_kind_of_mark_is_in_a_legend(panels):
     walls, changes = ([text.get_text() for text in ax.get_legend().get_texts()] for ax in panels)
     assert walls == ["as described", "in every corner", "attacked", "formula", "published"]
     assert set(changes) == {"stiffer", "softer", "as stiff within a tenth", "as described"}
+
+
+def test_an_element_fell_only_where_a_wall_that_it_bears_in_every_corner_broke():
+    why = Failure("hold x 1", 1.0, gone=False)
+    won, lost, kept = (
+        Rival(best, 900.0, 1.0, broken=(below, why)) for best, below in ((DAMPED, 1800.0), (TWO, 1530.0), (ONE, 1910.0))
+    )
+    assert fallen([won, lost, kept], won) == ((TWO, 1530.0),)

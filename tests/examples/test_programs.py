@@ -137,19 +137,17 @@ def test_a_plant_of_another_language_moves_as_the_exact_flow_and_the_books_find_
 def test_a_plant_that_diverges_ends_the_run_at_the_tick_at_which_our_own_does_though_the_logger_is_held_up_at_its_end(
     tmp_path: Path, running: Start
 ) -> None:
-    """What the plant sends last is more than a socket of the system buffers, and longer on its way than a second."""
     wild = ("dissipation.0.damping=60", "diverged_beyond=0.07")
-    held = ("run.block_ticks=1000", "run.deadline=30", "event=[{at=0.01, pause=true}]")
+    held = ("run.block_ticks=1000", "run.deadline=30", "event=[{at=0.01, pause=true}]")  # more than a socket buffers
     run = running(*seat("plant", in_node("plant.js")), scene=SCENES / "fig6b.toml", sets=(*wild, *held), pace=FREE)
     run.reaches(10)
     run.send("logger", signal.SIGSTOP)
     run.ask("resume")
     wait_for("the plant's end", lambda: run.stood_for(1.5))
     run.send("logger", signal.SIGCONT)
-    summary = run.summary()
-    assert summary["ended"] == "diverged"
+    summary, truth = run.summary(), own(tmp_path, "fig6b.toml", *wild)
     assert "beyond the limit of 0.07 m" in summary["why"]
-    assert summary["ticks"] == len(own(tmp_path, "fig6b.toml", *wild)["/controller"]["x"])
+    assert (summary["ended"], summary["ticks"]) == ("diverged", len(truth["/controller"]["x"]))
 
 
 @pytest.mark.parametrize("how", ["to its end", "killed", "without its launcher"])

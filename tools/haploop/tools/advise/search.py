@@ -25,7 +25,17 @@ from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, attack, every_ca
 from haploop.tools.advise.walls.corners import ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, Limit, Query, ladder, limits
 from haploop.tools.advise.walls.trial import Trial
-from haploop.tools.advise.withstand import BEYOND, ROUGH, WORTH, Best, Broken, advised, rivals, withstand
+from haploop.tools.advise.withstand import (
+    BEYOND,
+    ROUGH,
+    WORTH,
+    Best,
+    Broken,
+    Rival,
+    advised,
+    rivals,
+    withstand,
+)  # fmt: skip
 
 # Parameters that are tried in every corner, by their places among those that bear as much in the loop as described;
 # what suits a device of half the mass is smaller.
@@ -118,7 +128,7 @@ def search(
     stage("softer walls and the attack")
     compared = rivals(bests, worst)
     won = withstand(loop, trial, compared, of)
-    fell = tuple((each.best, each.broken[0]) for each in compared if each is not won and each.broken)
+    fell = fallen(compared, won)
     alone = withstand(loop, trial, [rival for rival in compared if rival.best.family is NOTHING], of).bound_N_m
     choice = won.best.family, won.best.values
     described = known.get(choice) or nominal([choice], *rungs)[choice]
@@ -127,6 +137,15 @@ def search(
     shown = tuple(best if each.family is best.family else each for each in bests)
     others = tuple(family for family in OTHERS if family not in good)
     return Found(shown, best, won.bound_N_m, as_assumed, won.broken, count, others, simple, hidden, fell, alone)
+
+
+def fallen(compared: Sequence[Rival], won: Rival) -> tuple[tuple[Best, float], ...]:
+    """Returns those that more holds or the attack broke on a wall, N/m, which they bear in every corner, but for one.
+
+    A stiffer wall that breaks says nothing of that: every limit has one.
+    """
+    lost = ((each.best, each.broken[0]) for each in compared if each is not won and each.broken)
+    return tuple((best, below) for best, below in lost if best.safe and below <= best.safe.stiffness_N_m)
 
 
 def _equals(known: dict[Choice, Limit], family: Family) -> list[Values]:
