@@ -73,7 +73,7 @@ def check_motion(seed: int) -> None:
             by_array[key] for key in ("verdict", "ticks", "why")
         )
         energy, exact = result["energy"], by_array["energy"]
-        assert energy["residual_J"] < 1e-12 * energy["moved_J"]
+        assert energy["residual_J"] < 1e-14 * energy["moved_J"]
         if ties:
             continue
         assert [account["true_J"] for account in energy["elements"]] == pytest.approx(
@@ -121,5 +121,5 @@ def test_loops_that_diverge_stand_still_where_they_did(
         }
         assert agree(result["final"], exact["final"], 1e-6)
         assert agree(result["window"], exact["window"], 1e-6)
-        assert result["energy"]["residual_J"] < 1e-12 * result["energy"]["moved_J"]
+        assert result["energy"]["residual_J"] < 1e-14 * result["energy"]["moved_J"]
         assert result["energy"]["moved_J"] == pytest.approx(exact["energy"]["moved_J"], rel=1e-6)

@@ -12,7 +12,7 @@ import numpy as np
 from haploop.controller.recorder import Row
 from haploop.controller.tick import NoForce
 from haploop.launch.batch.batch import Batch
-from haploop.launch.batch.jax.block import RINGS, Block, BlockInputs, Carry, Rings, constants_of, numbers_of
+from haploop.launch.batch.jax.block import RINGS, Block, BlockInputs, Carry, Numbers, Rings, constants_of, numbers_of
 from haploop.launch.batch.jax.programs import Call, Programs
 from haploop.launch.batch.jax.tick import BatchParams, BatchState, Forces, NotCompilable, TickInputs
 from haploop.launch.batch.jax.window import CompiledWindow
@@ -31,8 +31,9 @@ from haploop.protocol.trees import tree_leaves, tree_map, tree_unflatten
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-# Ticks that a program goes through at a time.
-BLOCK_TICKS = 128
+# Ticks that a program goes through at a time, at most: to begin takes as long as several ticks of some hundred members;
+# of more members the hand's forces, where each has its own, would fill the memory.
+_BLOCK_TICKS, _BLOCK_TICKS_OF_MANY, _MANY = 512, 128, 1024
 
 
 class CompiledBatch(Batch):
@@ -59,7 +60,8 @@ class CompiledBatch(Batch):
         self._actuated = self._line if isinstance(self._line, ActuatedLine) else None
         self._delay: Any = self._actuated.line if self._actuated else self._line
         resolution = self._logger.window.swing_m
-        self._window = self._logger.window = CompiledWindow(self._time, resolution, size, spare_ticks=BLOCK_TICKS)
+        self._block = max(1, min(self._time.ticks, _BLOCK_TICKS if size <= _MANY else _BLOCK_TICKS_OF_MANY))
+        self._window = self._logger.window = CompiledWindow(self._time, resolution, size, spare_ticks=self._block)
         # A batch of which only the program changes anything needs the window at its end, unless a member diverges.
         self._keep_from = 0 if self._changes else max(0, self._end - self._window.kept_ticks)
 
@@ -97,16 +99,18 @@ class CompiledBatch(Batch):
         params, state = self._params(), self._state()
         x = self._window.state.x.reshape(-1, self._time.steps_per_tick, len(self._ended))
         rings = Rings(x, {name: self._window.state.rows[name] for name in RINGS})
-        carry, inputs = self._carry(first, state), self._inputs(params, first, first)
+        # What no block changes is handed over once: that takes a millisecond of every block otherwise.
+        fixed = jax.device_put((numbers_of(params), np.asarray(self._limit_m)))
+        carry, inputs = self._carry(first, state), self._inputs(params, fixed, first, first)
         call = self._call(params, state, (carry, rings, inputs))
         rings, done = self._programs.begun(rings, first), first
-        before = deque[tuple[Carry, BlockInputs]](maxlen=-(-self._window.kept_ticks // BLOCK_TICKS) + 1)
+        before = deque[tuple[Carry, BlockInputs]](maxlen=-(-self._window.kept_ticks // self._block) + 1)
         while done < until and not self._ended.all():
-            end = min(done + BLOCK_TICKS, until)
+            end = min(done + self._block, until)
             if done - first < len(self._window.state.rows["wall_position"]):  # beyond, what would be written is there
                 ring = self._window.state.rows["wall_position"]
                 ring[np.arange(done, end) % len(ring)] = self._controller.params.wall.position
-            inputs = self._inputs(params, done, end)
+            inputs = self._inputs(params, fixed, done, end)
             before.append((carry, inputs))
             carry, rings = call(carry, rings, inputs)
             done = end
@@ -131,7 +135,7 @@ class CompiledBatch(Batch):
     def _call(self, params: BatchParams, state: BatchState, args: tuple[Carry, Rings, BlockInputs]) -> Call:
         carry, _, inputs = args
         elements = tuple(type(active.element) for active in params.controller.elements)
-        shapes = tuple((np.shape(a), np.result_type(a)) for a in jax.tree.leaves((carry, inputs)))
+        shapes = tuple((np.shape(a), getattr(a, "dtype", type(a))) for a in jax.tree.leaves((carry, inputs)))
         key = self._key, elements, constants_of(params), shapes
         names = tuple(self._plant_books.names) if self._plant_books else ()
         block = Block(params, state, names, self._has_wall)
@@ -193,21 +197,20 @@ class CompiledBatch(Batch):
             self._noisy.go_on(end, noise)
         self._in_flight.extend(commands)
 
-    def _inputs(self, params: BatchParams, first: int, end: int) -> BlockInputs:
+    def _inputs(self, params: BatchParams, fixed: tuple[Numbers, Any], first: int, end: int) -> BlockInputs:
         n, response = self._time.steps_per_tick, self._motion.response
-        tau = response.tau.at_steps(first * n, (first + BLOCK_TICKS) * n + 1)
+        tau = response.tau.at_steps(first * n, (first + self._block) * n + 1)
         shared = None
         if response.is_shared and params.held.shape[-1] == 1:
-            shared = response.between(first, BLOCK_TICKS).transpose(2, 1, 0, 3)
+            shared = response.between(first, self._block).transpose(2, 1, 0, 3)
         noise = self._rows_of(self._noisy.draw, end - first) if self._noisy else None
         ticks_in = TickInputs(tau, shared, noise, np.int64(0))
-        limit_m, keep_from = np.asarray(self._limit_m), np.int64(self._keep_from)
-        return BlockInputs(numbers_of(params), limit_m, ticks_in, np.int64(first), np.int64(end - first), keep_from)
+        return BlockInputs(*fixed, ticks_in, np.int64(first), np.int64(end - first), np.int64(self._keep_from))
 
     def _rows_of(self, draw: Draw, ticks: int) -> np.ndarray:
-        """The next random numbers, shape (BLOCK_TICKS,) or (BLOCK_TICKS, members)."""
+        """The next random numbers, shape (block,) or (block, members)."""
         one_for_all = not isinstance(draw, NormalRows)
-        rows = np.zeros((BLOCK_TICKS, *([] if one_for_all else [len(self._ended)])))
+        rows = np.zeros((self._block, *([] if one_for_all else [len(self._ended)])))
         for row in range(ticks):
             rows[row] = draw()
         return rows

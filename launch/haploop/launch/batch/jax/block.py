@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -14,15 +14,19 @@ from haploop.launch.batch.jax.rows import Rows
 from haploop.launch.batch.jax.tick import (
     BatchParams,
     BatchState,
+    Decided,
     Forces,
+    Moved,
     NotCompilable,
     TickInputs,
-    TickOutputs,
     added_in_tick,
-    batch_tick,
+    decided,
+    moved,
 )
 from haploop.logger.books.work import lost
 from haploop.protocol.trees import tree_leaves, tree_map, tree_unflatten
+
+T = TypeVar("T")
 
 # Rings of the window that are written at every tick, beside that of x.
 RINGS = ("x", "total", "in_contact")
@@ -34,7 +38,7 @@ class Carry(NamedTuple):
     Attributes:
         state: leaves of the state.
         extremes: least and greatest x in m, greatest force in N.
-        books: sum and error of every book, by name.
+        books: sum and error of every book, by name; within a block the sum of what it has added.
         x_m: measured position at the last tick.
         past: commands (by the name "command"), forces of the wall and of every element's book, of all ticks from the
             oldest command that acts in the next interval on, and of one before, tick k in row k modulo L + 2; shape
@@ -45,7 +49,7 @@ class Carry(NamedTuple):
     running: Any
     ticks: Any
     extremes: tuple[Any, Any, Any]
-    books: dict[str, tuple[Any, Any]]
+    books: dict[str, Any]
     x_m: Any
     past: Forces
 
@@ -62,6 +66,13 @@ class Rings(NamedTuple):
     rows: dict[str, Any]
 
 
+class Numbers(NamedTuple):
+    """Leaves of parameters that a program is given anew for every group: all floats as one array, and the arrays."""
+
+    floats: Any
+    arrays: list[Any]
+
+
 class BlockInputs(NamedTuple):
     """Inputs of a block.
 
@@ -72,7 +83,7 @@ class BlockInputs(NamedTuple):
             writing all of them to memory would take as long as computing them.
     """
 
-    params: list[Any]
+    params: Numbers
     limit_m: Any
     ticks_in: TickInputs
     first_tick: Any
@@ -80,18 +91,28 @@ class BlockInputs(NamedTuple):
     keep_from: Any
 
 
-def numbers_of(params: Any) -> list[Any]:
-    """Returns the leaves that a program is given anew for every group: floats and arrays."""
-    return [leaf for leaf in tree_leaves(params) if _is_number(leaf)]
+def numbers_of(params: Any) -> Numbers:
+    """Returns the numbers of a tree."""
+    leaves = tree_leaves(params)
+    floats = [leaf for leaf in leaves if isinstance(leaf, float)]
+    return Numbers(np.array(floats), [leaf for leaf in leaves if isinstance(leaf, np.ndarray)])
+
+
+def with_numbers(params: T, numbers: Numbers) -> T:
+    """Returns the tree with these numbers in the places of its own."""
+    floats, arrays = iter(numbers.floats), iter(numbers.arrays)
+
+    def renewed(leaf: Any) -> Any:
+        if isinstance(leaf, float):
+            return next(floats)
+        return next(arrays) if isinstance(leaf, np.ndarray) else leaf
+
+    return tree_map(renewed, params)
 
 
 def constants_of(params: Any) -> Hashable:
     """Returns the other leaves as far as they can be compared: whole numbers, truth values and text."""
     return tuple(leaf for leaf in tree_leaves(params) if isinstance(leaf, int | str))
-
-
-def _is_number(leaf: Any) -> bool:
-    return isinstance(leaf, float | np.ndarray)
 
 
 class Block:
@@ -107,32 +128,35 @@ class Block:
 
     def run(self, carry: Carry, rings: Rings, inputs: BlockInputs) -> tuple[Carry, Rings]:
         """Goes through the ticks of a block; NotCompilable where the state after one is none to begin a tick with."""
-        numbers = iter(inputs.params)
-        params = tree_map(lambda leaf: next(numbers) if _is_number(leaf) else leaf, self._params)
+        params = with_numbers(self._params, inputs.params)
 
         def body(i: Any, now: tuple[Carry, Rings]) -> tuple[Carry, Rings]:
             return self._step(*now, params, inputs, i)
 
-        return jax.lax.fori_loop(0, inputs.ticks, body, (carry, rings))
+        # A block's own sums are short, so their rounding is: only where they join the books is what is lost kept.
+        none = {name: jnp.zeros_like(sums) for name, (sums, _) in carry.books.items()}
+        ended, rings = jax.lax.fori_loop(0, inputs.ticks, body, (carry._replace(books=none), rings))
+        books = {name: _add(carry.books[name], of_block) for name, of_block in ended.books.items()}
+        return ended._replace(books=books), rings
 
     def _step(
         self, carry: Carry, rings: Rings, params: BatchParams, inputs: BlockInputs, i: Any
     ) -> tuple[Carry, Rings]:
         now = inputs.first_tick + i
         size, length = len(carry.past["command"]), rings.x.shape[0]
-        before = [
-            {name: ring[(now - ago) % size] for name, ring in carry.past.items()} for ago in (size - 1, size - 2, 1)
-        ]
-        at_tick = inputs.ticks_in.at(i, rings.x.shape[1])._replace(command=before[1]["command"])
-        after, told = batch_tick(params, tree_unflatten(self._state, carry.state), at_tick)
-        added, forces = self._booked(params, told, carry.x_m, before, inputs.ticks > 0)
+        state, at_tick = tree_unflatten(self._state, carry.state), inputs.ticks_in.at(i, rings.x.shape[1])
+        command = decided(params, state, at_tick)
+        # Written before anything is read of them, the rings of forces need not be copied.
+        past = {name: ring.at[now % size].set(command.forces[name]) for name, ring in carry.past.items()}
+        before = [{name: ring[(now - ago) % size] for name, ring in past.items()} for ago in (size - 1, size - 2, 1)]
+        after, told = moved(params, state, at_tick, command, before[1]["command"])
+        added = self._added(params, told, command, before, carry.x_m, inputs.ticks > 0)
         # The last row may hold where the members began.
         place = jnp.where(now >= inputs.keep_from, now % length, length - 2 - now % 2)
         rings = Rings(
             rings.x.at[place].set(jnp.stack(told.x.rows[1:])),
-            {name: ring.at[place].set(told.row[name]) for name, ring in rings.rows.items()},
+            {name: ring.at[place].set(command.row[name]) for name, ring in rings.rows.items()},
         )
-        past = {name: ring.at[now % size].set(forces[name]) for name, ring in carry.past.items()}
         least, most, strongest = carry.extremes
         held = Rows([force for _, force in told.held])
         extremes = (
@@ -142,34 +166,35 @@ class Block:
         )
         # Nothing is added to the books of a member that has ended; of all else it keeps what was.
         books = {
-            name: _add(book, jnp.where(carry.running, added[name], 0.0)) if name in added else book
+            name: book + jnp.where(carry.running, added[name], 0.0) if name in added else book
             for name, book in carry.books.items()
         }
-        changed = Carry(_as_before(carry.state, after), carry.running, carry.ticks + 1, extremes, {}, told.row["x"], {})
+        changed = Carry(
+            _as_before(carry.state, after), carry.running, carry.ticks + 1, extremes, {}, command.row["x"], {}
+        )
         stays = jax.tree.map(
             lambda new, old: jnp.where(carry.running, new, old), changed, carry._replace(books={}, past={})
         )
         running = carry.running & (abs(told.x[-1]) <= inputs.limit_m)
         return stays._replace(running=running, books=books, past=past), rings
 
-    def _booked(
-        self, params: BatchParams, told: TickOutputs, x_m_before: Any, before: list[Forces], go: Any
-    ) -> tuple[Forces, Forces]:
-        """Returns a tick's additions to the books, and its forces; ``before``: of commands that act, and the last."""
-        command = {"command": told.row["total"]}
+    def _added(
+        self, params: BatchParams, told: Moved, command: Decided, before: list[Forces], x_m_before: Any, go: Any
+    ) -> dict[str, Any]:
+        """Returns a tick's additions to the books; ``before``: forces of commands that act, and of the tick before."""
         if not self._book_names:
-            return {}, command
-        apart, now = partial(_apart, go), told.forces
+            return {}
+        now = {name: force for name, force in command.forces.items() if name != "command"}
         wall = params.controller.wall if self._has_wall else None
         step_s = params.controller.motion.period_s / (len(told.x) - 1)
-        acting = [before[0], before[1] if params.lookahead else now]
+        x_m, apart = [x_m_before, command.row["x"]], partial(_apart, go)
 
-        def added() -> Forces:
+        def added() -> dict[str, Any]:
             return added_in_tick(
-                params.books, self._book_names, told, acting, before[2], x_m_before, wall, step_s, apart
+                params.books, self._book_names, told, now, before[:2], before[2], x_m, wall, step_s, apart
             )
 
-        return apart(added), now | command
+        return apart(added)
 
 
 def _as_before(before: list[Any], after: BatchState) -> list[Any]:

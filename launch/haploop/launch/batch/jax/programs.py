@@ -101,7 +101,7 @@ def most() -> int:
         told[_FLAGS] = f"{flags} {_OPTIONS}{_ONE_FUNCTION}=1000000000"
     with _environment(told):
         on_cpu = jax.default_backend() == "cpu"
-    return 1024 if on_cpu else 16384
+    return 512 if on_cpu else 16384
 
 
 @contextmanager

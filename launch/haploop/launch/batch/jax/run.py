@@ -34,7 +34,7 @@ def compiled_results(
     rounding. Positions stay within 1e-11 of the largest excursion of the scene alone while no rounding of the encoder,
     contact, gate or window of an estimator falls to the other side; where one does, the run is another of the same
     kind from there on, so in long limit cycles it is amplitude and energies that agree, not instants. The books
-    balance as well as alone.
+    balance to 1e-14 of the energy that moved: what single additions lose is kept block by block, not tick by tick.
 
     Args:
         scenes, kinds, energy, fewest: as for ``batch_results``, by which a scene is run that cannot be compiled: one

@@ -80,14 +80,12 @@ class TickInputs(NamedTuple):
         response: forced response in the interval, shape (n + 1, 2, 1), where all members have the same; else None.
         noise: standard normal numbers, shape (members,) or (); None without noise.
         zero: a whole number that the compiler cannot know.
-        command: computed L ticks ago, N; not read where L is 0.
     """
 
     tau: Any
     response: Any
     noise: Any
     zero: Any
-    command: Any = None
 
     def at(self, tick: Any, n: int) -> TickInputs:
         """Returns the inputs of one of many ticks, each of n steps."""
@@ -96,15 +94,29 @@ class TickInputs(NamedTuple):
         return TickInputs(tau, response, None if self.noise is None else self.noise[tick], self.zero)
 
 
-class TickOutputs(NamedTuple):
-    """Outputs of a tick beside the state it leaves.
+class Decided(NamedTuple):
+    """Outcome of a tick up to the controller's command.
+
+    Attributes:
+        noise: of the position, m.
+        controller: its state after the tick.
+        row: x, total and in_contact of the controller.
+        forces: of the wall and of every element, N, by the names of their accounts, and the "command".
+    """
+
+    noise: Any
+    controller: StateTuple
+    row: dict[str, jax.Array]
+    forces: Forces
+
+
+class Moved(NamedTuple):
+    """The interval after a tick.
 
     Attributes:
         x, v, x_comp: at the steps of the interval and at its end, n + 1 rows.
         tau: of the hand at these steps, N, n + 1 rows.
         held: (steps, force in N) of every hold.
-        row: x, total and in_contact of the controller.
-        forces: of the wall and of every element, N, by the names of their accounts.
     """
 
     x: Rows
@@ -112,12 +124,10 @@ class TickOutputs(NamedTuple):
     x_comp: Rows
     tau: Rows
     held: list[tuple[int, Any]]
-    row: dict[str, jax.Array]
-    forces: dict[str, jax.Array]
 
 
-def batch_tick(params: BatchParams, state: BatchState, inputs: TickInputs) -> tuple[BatchState, TickOutputs]:
-    """Returns the state after a tick and the interval that follows it, and what they tell."""
+def decided(params: BatchParams, state: BatchState, inputs: TickInputs) -> Decided:
+    """Returns what the sensor tells the controller at a tick, and what it makes of that."""
     x, noise = state.motion.x, state.noise
     if params.noise is not None:
         noise = params.noise.after(noise, inputs.noise)
@@ -126,7 +136,20 @@ def batch_tick(params: BatchParams, state: BatchState, inputs: TickInputs) -> tu
     if params.feels:
         sample += (sensed_acceleration(params.mechanics, state.motion, state.acting, inputs.tau[0]),)
     controller, row = tick(params.controller, state.controller, sample)
-    newer, saturated = inputs.command if params.lookahead else row[-2], state.saturated
+    forces = {str(active.book): force for active, force in zip(params.controller.elements, row[4:-2], strict=True)}
+    told = {"x": row[0], "total": row[-2], "in_contact": row[-1]}
+    return Decided(noise, controller, told, {"wall": row[3], **forces, "command": row[-2]})
+
+
+def moved(
+    params: BatchParams, state: BatchState, inputs: TickInputs, after: Decided, command: Any
+) -> tuple[BatchState, Moved]:
+    """Returns the state at the end of the interval after a tick, and how the plant got there.
+
+    Args:
+        command: computed L ticks ago, N, which acts from r steps after the tick on.
+    """
+    newer, saturated = command, state.saturated
     if params.actuator is not None:
         newer, is_saturated = params.actuator.drive(newer)
         saturated = saturated + is_saturated
@@ -135,15 +158,12 @@ def batch_tick(params: BatchParams, state: BatchState, inputs: TickInputs) -> tu
     holds = [*([(late, state.acting, 0)] if late else []), (n - late, newer, 1)]
     noted: list[Any] = []
     motion = OneMassState(*advance(params.held, state.motion, holds, response[-1], noted))
-    forces = {str(active.book): force for active, force in zip(params.controller.elements, row[4:-2], strict=True)}
-    told = TickOutputs(
+    told = Moved(
         *_filled(params.held, noted, response, motion),
         tau,
         [(count, force) for count, force, _ in holds],
-        {"x": row[0], "total": row[-2], "in_contact": row[-1]},
-        {"wall": row[3], **forces},
     )
-    return BatchState(motion, newer, saturated, noise, controller), told
+    return BatchState(motion, newer, saturated, after.noise, after.controller), told
 
 
 def _response(params: BatchParams, inputs: TickInputs) -> Rows:
@@ -182,17 +202,18 @@ def rounded(value: Any, zero: Any) -> Any:
 
 
 def added_in_tick(
-    params: OneMassParams, names: Sequence[str], told: TickOutputs, acting: Sequence[Forces], before: Forces,
-    x_m_before: Any, wall: Wall | None, step_s: float, apart: Apart,
+    params: OneMassParams, names: Sequence[str], told: Moved, now: Forces, acting: Sequence[Forces], before: Forces,
+    x_m: Sequence[Any], wall: Wall | None, step_s: float, apart: Apart,
 ) -> dict[str, jax.Array]:  # fmt: skip
     """Returns what a tick adds to each book, J, by the names of ``Books``; shape (members,).
 
     Args:
-        acting: forces computed with the two newest commands that act in its interval.
-        before: those computed at the tick before.
+        now, before: forces of wall and elements computed at the tick, and at the one before.
+        acting: those computed with the two newest commands that act in its interval.
+        x_m: measured position at the tick before and at this one, m.
         apart: for what several books need; a compiler would make it for each of them anew.
     """
-    x, v, tau, now = told.x, told.v, told.tau, told.forces
+    x, v, tau = told.x, told.v, told.tau
     n, summed = len(x) - 1, partial(_sum_steps, apart)
     moved = displacement(x, told.x_comp, None, summed)
     counts, applied = zip(*told.held, strict=True)
@@ -213,9 +234,9 @@ def added_in_tick(
         flows |= zip(CAUSES, ideal_walls(wall, x[::n], v[::n], moved.by_tick, Rows([now["wall"]])), strict=True)
         if wall.dissipates:
             flows[DISSIPATED] = summed(dissipated(wall, x, v, step_s))
-    x_m: Any = Rows([x_m_before, told.row["x"]])
+    positions: Any = Rows(x_m)
     for account in now:
-        flows[f"{account}.sampled"] = sampled_work(x_m, before[account])
+        flows[f"{account}.sampled"] = sampled_work(positions, before[account])
     return {name: flow[0] for name, flow in flows.items()}
 
 
