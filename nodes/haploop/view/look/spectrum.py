@@ -44,19 +44,20 @@ def amplitudes(samples: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray
     return np.fft.rfftfreq(count, 1.0 / rate)[1:], found[..., 1:]
 
 
-def main_line(samples: np.ndarray, rate: float) -> Line | None:
+def main_line(samples: np.ndarray, rate: float, above_Hz: float = 0.0) -> Line | None:
     """Returns the line that stands out of the spectrum of samples, shape (count,); None where none does.
 
     Its frequency and height are those of the parabola through the logarithms of the three highest neighbours. None too
-    where fewer than three periods were seen, for which a frequency is a guess.
+    where fewer than three periods were seen, for which a frequency is a guess. Of what is no faster than ``above_Hz``
+    nothing counts, nor what leaks from there: lower beside it than at its own place it is no line.
     """
     if len(samples) < _FEWEST or not np.isfinite(samples).all():
         return None
     at, height = amplitudes(samples, rate)
-    power = height**2
-    peak = int(np.argmax(height))
+    power = np.where(at > above_Hz, height**2, 0.0)
+    peak = int(np.argmax(power))
     first, end = max(0, peak - _HALF_WIDTH), peak + _HALF_WIDTH + 1
-    if peak < 2 or not height[peak] > 1e-12 * np.abs(samples).max():
+    if peak < 2 or height[peak - 1] > height[peak] or not height[peak] > 1e-12 * np.abs(samples).max():
         return None
     share = float(power[first:end].sum() / power.sum())
     if share < _STANDS_OUT:

@@ -167,7 +167,7 @@ class Booking:
         forces = [np.concatenate(row) for row in rows]
         if piece.force_N is not None and self.force:
             forces.append(piece.force_N)
-        return np.array(forces), np.concatenate(velocity)
+        return np.array(forces).reshape(len(forces), len(piece.x_m)), np.concatenate(velocity)
 
     def _between(self, piece: Samples, true_x: Floats) -> Floats:
         """Returns the position at which the command changed, of every period that ends within the piece."""

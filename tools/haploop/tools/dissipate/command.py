@@ -18,6 +18,7 @@ from haploop.protocol.scene.scene import Clock, Device, Scene, accelerometer_is_
 from haploop.tools.cli.options import FAILED, WRONG_USE, leave, parse_assignments, plain_errors, print_json
 from haploop.tools.cli.scenes import kinds_with
 from haploop.tools.dissipate.booking import Booking
+from haploop.tools.dissipate.buzz import BuzzFinder
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.outcome import Outcome, Recording, Trace, make_outcome
 from haploop.tools.dissipate.position_noise import PositionNoise
@@ -52,10 +53,6 @@ class Selection:
     wall: str | None = None
     occupies: str = "below"
     overrides: Sequence[str] = ()
-
-    @property
-    def has_elements(self) -> bool:
-        return bool(self.dampings or self.masses or self.elements)
 
     def tables(self) -> frozenset[str]:
         """Returns the tables that the overrides change; RecordingError where one is of another table."""
@@ -99,7 +96,7 @@ def dissipate(request: Request, as_json: bool) -> None:
             outcome = compute_outcome(request, kinds_with(request.plugins))
         except (RecordingError, FileNotFoundError) as error:
             leave(str(error), WRONG_USE)
-    figure = _draw(outcome, request)
+    figure = _draw(outcome, request) if outcome.elements or outcome.force else None
     if as_json:
         print_json(outcome.as_data() | {"figure": str(figure) if figure else None})
         return
@@ -128,11 +125,13 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
     booking, noisier = Booking(*makings), Booking(*makings)
     # Of positions alone: what is recorded beside them does not come of their noise.
     noise = PositionNoise() if isinstance(recording, TextRecording) and not recording.recorded else None
+    found = BuzzFinder(recording.period_s)
     trace = Trace(recording.period_s, 2 + 2 * len(scene.dissipation) + 3 * recording.has_force)
     end_x_m, shown = None, console(stderr=True)
     with shown.status(f"reading {request.path.name}") if shown.is_terminal else nullcontext() as line:
         for piece in recording.samples():
             trace.add(booking.add(piece))
+            found.add(piece)
             if noise:
                 noisier.add(noise.added_to(piece))
             end_x_m = piece.end_x_m
@@ -140,7 +139,8 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
                 line.update(f"{request.path.name}: booked to {piece.t_s[-1]:.6g} s")
     if end_x_m is not None:
         booking.finish(end_x_m)
-    return make_outcome(recording, booking, trace, scene, kinds, noise and (noise.deviation_m, noisier.true_J))
+    noisy = noise and (noise.deviation_m, noisier.true_J)
+    return make_outcome(recording, booking, trace, scene, kinds, noisy, found)
 
 
 def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording, Scene]:
@@ -156,11 +156,6 @@ def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording,
         return recording, make_scene_for_log(selection, path, scene, kinds)
 
     recording = TextRecording(path, request.layout, request.delay_s or 0.0)
-    if not (selection.has_elements or recording.has_force):
-        raise RecordingError(
-            "Say which elements, --damping 2.7, --mass 0.0018, or --element KIND KEY=VALUE in quotes, "
-            "or which column is a force with --force."
-        )
     return recording, make_scene_for_text(selection, path, recording.period_s, recording.recorded, kinds)
 
 

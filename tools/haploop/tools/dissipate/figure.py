@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.tools.dissipate.outcome import Outcome
-from haploop.tools.dissipate.report import conclusion, make_row, note_sentences, rows
+from haploop.tools.dissipate.report import buzz_sentence, conclusion, make_row, note_sentences, rows
 from haploop.tools.dissipate.samples import Floats
 from haploop.tools.figure import style
 from haploop.tools.render.units import prefix_for
@@ -32,8 +32,8 @@ def make_figure(outcome: Outcome) -> Figure:
     """Draws motion and energies, whole and in detail, the table, and notes; FigureError where matplotlib is missing."""
     words = _words(outcome)
     below_in = _LINE_IN * len(words)
-    figure = style.empty_figure(13.0, 7.8 + below_in)
-    parts = figure.subfigures(3, 1, squeeze=False, height_ratios=(0.6, 7.2, below_in))[:, 0]
+    figure = style.empty_figure(13.0, 8.0 + below_in)
+    parts = figure.subfigures(3, 1, squeeze=False, height_ratios=(0.8, 7.2, below_in))[:, 0]
     header, body, below = parts
     lines, close = outcome.trace.lines(), outcome.trace.close
     lines_of_table = 1 + min(len(rows(outcome)), _MOST)
@@ -165,7 +165,9 @@ def _words(outcome: Outcome) -> list[str]:
 
 
 def _header(figure: SubFigure, outcome: Outcome) -> None:
-    figure.text(0.008, 0.72, outcome.recording.name, fontsize=style.LARGE, color=style.INK, va="center", gid="title")
+    figure.text(0.008, 0.78, outcome.recording.name, fontsize=style.LARGE, color=style.INK, va="center", gid="title")
     sentence = conclusion(outcome)
     words = textwrap.shorten(sentence[:1].upper() + sentence[1:], _LINE_LETTERS, placeholder=" …")
-    figure.text(0.008, 0.2, words, fontsize=style.TEXT + 1, color=style.INK, va="center", gid="answer")
+    look = {"fontsize": style.TEXT + 1, "color": style.INK, "va": "center"}
+    figure.text(0.008, 0.42, buzz_sentence(outcome), gid="buzz", **look)
+    figure.text(0.008, 0.12, words, gid="answer", **look)

@@ -11,6 +11,7 @@ import numpy as np
 from haploop.controller.dissipation import Element, Quantity
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.dissipate.booking import Booked, Booking
+from haploop.tools.dissipate.buzz import Buzz, BuzzFinder, Word
 from haploop.tools.dissipate.force_book import Passivity
 from haploop.tools.dissipate.samples import Floats, LogRecording
 from haploop.tools.dissipate.text_recording import TextRecording
@@ -140,8 +141,11 @@ class ForceOutcome:
 class Outcome:
     """The outcome of the elements, in the order of their selection, on a recording, with the controller's scene.
 
-    ``force`` is that of a recorded force, None where there was none; ``noise_m`` the noise that the recorded positions
-    have, None where rates were recorded beside them.
+    Attributes:
+        force: that of a recorded force; None where there was none.
+        noise_m: noise of the recorded positions; None where rates were recorded beside them.
+        buzz_word, buzz: whether the recording buzzes, and the buzz.
+        main_Hz: frequency of the buzz, or of a slower motion that has one; None of others.
     """
 
     recording: Recording
@@ -150,6 +154,9 @@ class Outcome:
     scene: Scene
     force: ForceOutcome | None
     noise_m: float | None
+    buzz_word: Word
+    buzz: Buzz | None
+    main_Hz: float | None
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -177,6 +184,9 @@ class Outcome:
             "between_samples": recording.between,
             "recorded": sorted(recording.recorded),
             "noise_m": self.noise_m,
+            "buzz_word": self.buzz_word,
+            "buzz": self.buzz and asdict(self.buzz),
+            "main_Hz": self.main_Hz,
             "samples": notes.pop("rows"),
             **notes,
             "elements": [asdict(element) for element in self.elements],
@@ -191,6 +201,7 @@ def make_outcome(
     scene: Scene,
     kinds: Mapping[str, type[Element]],
     noisier: tuple[float, Floats] | None,
+    found: BuzzFinder,
 ) -> Outcome:
     """Makes the outcome; ``noisier`` are the noise of the positions, m, and the true books with as much again."""
     noise_m, noisier_J = (noisier[0], noisier[1].tolist()) if noisier else (None, [None] * len(scene.dissipation))
@@ -219,7 +230,10 @@ def make_outcome(
         # The sign of a force in a log is known.
         is_signed = of.passivity == "other sign" and isinstance(recording, LogRecording)
         force = ForceOutcome(own, of.naive_J, "generated" if is_signed else of.passivity, of.excess_J)
-    return Outcome(recording, elements, trace, scene, force, noise_m)
+    buzz = found.buzz()
+    line = buzz or found.slow
+    main_Hz = line.frequency_Hz if line else None
+    return Outcome(recording, elements, trace, scene, force, noise_m, found.word(), buzz, main_Hz)
 
 
 def _label(table: ElementTable, declared: Mapping[str, tuple[Quantity, object]]) -> str:

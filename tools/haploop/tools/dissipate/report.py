@@ -9,6 +9,7 @@ from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.dissipate.force_book import Passivity
 from haploop.tools.dissipate.outcome import ElementOutcome, ForceOutcome, Outcome
+from haploop.tools.dissipate.swing_sentences import buzz_sentence, filtered_out, low_pass
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
 
@@ -41,10 +42,12 @@ _FAST_FORCE = (
     "{elements} is faster than a quarter of the sampling rate. Unless the device buzzed as fast, that is noise of the "
     "estimates, and so may be much of the energy."
 )
-_LOW_PASS = (
-    "Low-pass the estimates, as by --set acceleration.cutoff=20 or --set velocity.cutoff=50, until the energy no "
-    "longer depends on it."
+_NO_ELEMENT = (
+    "no element was named. Say which, --damping 2.7, --mass 0.0018, or --element KIND KEY=VALUE in quotes, "
+    "or which column is a force with --force."
 )
+_NO_FORCE = "none of these would have given a force on this motion"
+_BESIDE_WALL = "{none}: it lies from {low} to {high}, and the wall {occupies} {wall}."
 # An inertia above this, kg, is more often a mass in grams: the heaviest device that comes with haploop has 0.2 kg.
 _HEAVY_KG = 0.5
 _HEAVY = '{label}: a mass without a unit is in kg; is that what was meant? 1.8 g is --mass "1.8 g" or --mass 0.0018.'
@@ -65,14 +68,18 @@ _COUNTS = {
 
 
 def make_report(outcome: Outcome) -> RenderableType:
-    """Makes the report: conclusion, table and notes."""
+    """Makes the report: doubts, whether it buzzes, conclusion, table and notes."""
     numbers = ("true", "sampled", "took", "gave back", "largest force")
     table = make_table("taken out of the device", *numbers, numbers=numbers)
     for element in rows(outcome):
         table.add_row(*make_row(element))
     head = Text(f"{outcome.recording.name}: {conclusion(outcome)}", style="bold")
-    doubts = [Text(sentence, style="bold yellow") for sentence in outcome.recording.notes.remarks]
-    return Group(*doubts, head, table, *(Text(sentence, style="dim") for sentence in note_sentences(outcome)))
+    doubts = [
+        Text(sentence, style="bold yellow") for sentence in [*outcome.recording.notes.remarks, *filtered_out(outcome)]
+    ]
+    buzz = Text(buzz_sentence(outcome), style="bold" if outcome.buzz else "")
+    notes = (Text(sentence, style="dim") for sentence in note_sentences(outcome))
+    return Group(*doubts, buzz, head, *([table] if rows(outcome) else []), *notes)
 
 
 def rows(outcome: Outcome) -> list[ElementOutcome]:
@@ -90,13 +97,23 @@ def conclusion(outcome: Outcome) -> str:
     """Returns who would have dissipated most, and who would have fed the motion; of a force alone its work."""
     if not outcome.elements and outcome.force:
         return _passivity(outcome)
+    if not outcome.elements:
+        return _NO_ELEMENT
     if not any(element.strongest_N for element in outcome.elements):
-        return "none of these would have given a force on this motion."
+        return _without_force(outcome)
 
     words = _energies(outcome.elements)
     if noisy := [element.label for element in outcome.elements if element.is_fast or element.is_moved_by_noise]:
         words += f". Not to be relied on, since much of it or of its force is noise: {', '.join(noisy)}"
     return f"{words}."
+
+
+def _without_force(outcome: Outcome) -> str:
+    wall, x = outcome.scene.wall, outcome.trace.lines()[1]
+    if not wall or outcome.scene.event:
+        return f"{_NO_FORCE}."
+    low, high, at = (amount(float(each), "m") for each in (x.min(), x.max(), wall.position))
+    return _BESIDE_WALL.format(none=_NO_FORCE, low=low, high=high, occupies=wall.occupies, wall=at)
 
 
 def _energies(elements: list[ElementOutcome]) -> str:
@@ -128,7 +145,7 @@ def note_sentences(outcome: Outcome) -> list[str]:
     sentences = [
         f"{notes.rows} samples at {1.0 / recording.period_s:.6g} Hz, {from_s:g} to {to_s:g} s.",
         (f"Taken as recorded: {taken}. " if taken else "") + _estimates(outcome.scene, estimated),
-        _truth(outcome),
+        _truth(outcome) if rows(outcome) else "",
         _SIZES if len(outcome.elements) > 1 else "",
         _IN_CONTACT if any(element.acts == "in-contact" for element in outcome.scene.dissipation) else "",
         *(_HEAVY.format(label=each.label) for each in outcome.elements if _is_heavy(each)),
@@ -143,7 +160,7 @@ def note_sentences(outcome: Outcome) -> list[str]:
         if count := getattr(notes, name):
             percent, missing = 100.0 * count / notes.rows, amount(notes.missing_s, "s")
             sentences.append(sentence.format(count=count, percent=percent, missing=missing))
-    return [sentence for sentence in [*sentences, *notes.remarks] if sentence]
+    return [sentence for sentence in [*sentences, *notes.remarks, *filtered_out(outcome)] if sentence]
 
 
 def _noise(outcome: Outcome) -> list[str]:
@@ -157,7 +174,7 @@ def _noise(outcome: Outcome) -> list[str]:
         _NOISY_POSITIONS.format(noise=amount(outcome.noise_m, "m"), elements=", ".join(moved)) if moved else "",
         _FAST_FORCE.format(elements=" and ".join(fast)) if fast else "",
     ]
-    return [*sentences, _LOW_PASS] if moved or fast else []
+    return [*sentences, low_pass(outcome)] if moved or fast else []
 
 
 def _is_heavy(element: ElementOutcome) -> bool:

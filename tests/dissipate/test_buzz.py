@@ -1,0 +1,147 @@
+"""Whether a recording buzzes: told of swings that last, at their frequency, and of nothing else."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from haploop.tools.cli.app import app
+from haploop.tools.dissipate.buzz import BuzzFinder
+from haploop.tools.dissipate.figure import make_figure
+from haploop.tools.dissipate.report import make_report, note_sentences
+from haploop.tools.dissipate.samples import Floats, Samples
+from helpers.data.recordings import outcome, write
+from helpers.shown import shown
+
+S: Floats = np.arange(4000.0) * 1e-3
+COUNT_M = 11e-6
+
+
+def finder(x_m: Floats, t_s: Floats | None = None, piece: int = 700, period_s: float = 1e-3) -> BuzzFinder:
+    """Makes the finder that has read positions in pieces without a gap."""
+    found, t_s = BuzzFinder(period_s), np.arange(float(len(x_m))) * period_s if t_s is None else t_s
+    for at in range(0, len(x_m), piece):
+        t, x = t_s[at : at + piece], x_m[at : at + piece]
+        found.add(Samples(t, x, None, None, x, None, at == 0))
+    return found
+
+
+def counted(x_m: Floats) -> Floats:
+    return np.round(x_m / COUNT_M) * COUNT_M
+
+
+def swing(frequency_Hz: float, amplitude_m: float) -> Floats:
+    return amplitude_m * np.sin(2.0 * np.pi * frequency_Hz * S)
+
+
+@pytest.mark.parametrize("frequency_Hz", [17.0, 31.0, 77.3, 180.0, 400.0])
+@pytest.mark.parametrize("hand_Hz", [0.0, 0.7, 3.1])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_buzz_is_told_at_its_frequency_on_a_hands_motion_noise_and_counts(
+    frequency_Hz: float, hand_Hz: float, seed: int
+) -> None:
+    noise = 3e-6 * np.random.default_rng(seed).standard_normal(len(S))
+    found = finder(counted(swing(frequency_Hz, 2e-4) + swing(hand_Hz, 3e-3) + noise))
+    buzz = found.buzz()
+    assert found.word() == "buzzes"
+    assert buzz is not None
+    assert abs(buzz.frequency_Hz - frequency_Hz) < 0.5 * buzz.within_Hz
+    assert buzz.width_m == pytest.approx(4e-4, rel=0.15)
+    assert (buzz.from_s, buzz.to_s) == (0.0, pytest.approx(S[-1], abs=0.125))
+
+
+@pytest.mark.parametrize("begins_s", [1.0, 1.3, 2.0, 2.4])
+def test_a_buzz_begins_when_it_does_within_half_a_second(begins_s: float) -> None:
+    buzz = finder(counted(swing(31.0, 2.6e-4) * (begins_s < S) - 2e-3 * np.minimum(S, 1.0))).buzz()
+    assert buzz is not None
+    assert buzz.from_s == pytest.approx(begins_s, abs=0.5)
+
+
+def test_the_frequency_is_that_of_the_times_where_they_jitter() -> None:
+    t = np.sort(1.01 * S + np.random.default_rng(2).uniform(-1e-4, 1e-4, len(S)))
+    buzz = finder(2e-4 * np.sin(2.0 * np.pi * 300.0 * t), t).buzz()
+    assert buzz is not None
+    assert buzz.frequency_Hz == pytest.approx(300.0, abs=0.5)
+
+
+def _ring(t: Floats, frequency_Hz: float, decay_s: float) -> Floats:
+    return np.where(t > 0.0, np.exp(-np.maximum(t, 0.0) / decay_s) * np.sin(2.0 * np.pi * frequency_Hz * t), 0.0)
+
+
+def _waves(frequency_Hz: float) -> list[Floats]:
+    sine = np.sin(2.0 * np.pi * frequency_Hz * S)
+    return [sine, np.arcsin(sine) / 1.6, np.maximum(sine, 0.0), np.clip(2.0 * sine, -1.0, 1.0), sine**3]
+
+
+STILL: dict[str, Callable[[], list[Floats]]] = {
+    "hand": lambda: [3e-3 * wave for f in (0.3, 2.0, 3.0, 4.5, 6.0, 8.0, 10.0) for wave in _waves(f)],
+    "ramp": lambda: [v * of for v in (1e-3, 5e-3, 2e-2) for of in (S, np.minimum(S, 2.0), np.abs(S - 2.0), S**2)],
+    "tap": lambda: [1e-3 * _ring(S - 1.0, f, tau) for f in (20.0, 40.0, 100.0) for tau in (0.05, 0.1, 0.3)],
+    "taps": lambda: [
+        sum((1e-3 * _ring(S - at, f, 0.05) for at in (0.5, 1.1, 1.7, 2.2, 2.9, 3.4)), np.zeros(len(S)))
+        for f in (20.0, 40.0)
+    ],
+    "rest": lambda: [np.zeros(len(S))],
+}
+
+
+@pytest.mark.parametrize("name", STILL)
+def test_what_a_hand_does_or_is_struck_is_no_buzz_be_it_rounded_or_not(name: str) -> None:
+    for x in STILL[name]():
+        assert finder(x).word() == "none seen"
+        assert finder(counted(x)).word() == "none seen"
+
+
+@pytest.mark.parametrize("period_s", [5e-3, 1e-3, 1e-4])
+def test_noise_is_no_buzz(period_s: float) -> None:
+    for seed in range(8):
+        random, count = np.random.default_rng(seed), round(4.0 / period_s)
+        white = np.asarray(COUNT_M * random.standard_normal(count), float)
+        for x in (white, np.cumsum(white), counted(white), counted(COUNT_M * random.random(count))):
+            assert finder(x, period_s=period_s).word() == "none seen"
+
+
+def test_of_a_short_slow_or_broken_recording_it_cannot_be_said() -> None:
+    assert finder(np.zeros(900)).word() == "cannot say"
+    assert finder(np.zeros(900), period_s=1e-2).word() == "cannot say"
+    found = BuzzFinder(1e-3)
+    for at in (0, 600, 1200):
+        found.add(Samples(S[at : at + 500], S[at : at + 500], None, None, S[at : at + 500], None, True))
+    assert found.word() == "cannot say"
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    return write(tmp_path / "buzz.csv", {"t": S, "x": counted(swing(31.0, 2.6e-4) * (S > 2.0) - 1e-3 * S)})
+
+
+def test_the_buzz_is_the_first_thing_said_also_without_an_element(recording: Path) -> None:
+    said = "The recording buzzes: it swings at 31.0 Hz (give or take 1 Hz), 5"
+    booked = outcome(recording, dampings=["2"])
+    assert shown(make_report(booked), 200).startswith(said)
+    assert any(text.get_text().startswith(said) for part in make_figure(booked).subfigs for text in part.texts)
+    result = CliRunner().invoke(app, ["dissipate", str(recording)])
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith(said)
+    assert "no element was named" in result.stdout
+    data = json.loads(CliRunner().invoke(app, ["dissipate", str(recording), "--json"]).stdout)
+    assert (data["buzz_word"], data["elements"], data["figure"]) == ("buzzes", [], None)
+    assert data["buzz"]["frequency_Hz"] == pytest.approx(31.0, abs=1.0) == data["main_Hz"]
+
+
+def test_the_advised_low_pass_leaves_the_swing_of_the_motion_in(recording: Path, tmp_path: Path) -> None:
+    notes = note_sentences(outcome(recording, masses=["0.01"]))
+    assert any("acceleration.cutoff=93 or --set velocity.cutoff=93" in sentence for sentence in notes)
+    fast = write(tmp_path / "fast.csv", {"t": S, "x": counted(swing(180.0, 1e-4))})
+    assert any("No low-pass of the estimates suits" in each for each in note_sentences(outcome(fast, masses=["0.01"])))
+
+
+@pytest.mark.parametrize(("cutoff", "is_told"), [("20", True), ("30", True), ("93", False)])
+def test_a_low_pass_that_filters_the_swing_out_is_told(recording: Path, cutoff: str, is_told: bool) -> None:
+    report = shown(make_report(outcome(recording, masses=["0.01"], overrides=[f"acceleration.cutoff={cutoff}"])), 200)
+    assert (f"acceleration.cutoff = {cutoff} Hz is no more than the 31 Hz" in report) == is_told

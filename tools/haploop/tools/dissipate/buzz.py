@@ -1,0 +1,132 @@
+"""The buzz of a recording: a swing faster than a hand's, at one frequency, that lasts and is wide enough to be felt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from haploop.launch.stability.traces import is_felt
+from haploop.tools.dissipate.samples import Floats, Samples
+from haploop.view.look.spectrum import Line, main_line
+
+# Slower swings are a hand's: voluntary ones end at some 8 Hz, tremor at 12 Hz.
+ABOVE_HZ = 15.0
+# The spectrum is that of windows so long, a quarter of it apart.
+_WINDOW_S = 0.5
+# A swing at one frequency has so much of the variance of all that is faster than ``ABOVE_HZ``.
+_SHARE = 0.8
+# The staircase of an encoder swings by less than a count, here the step that nine of ten exceed.
+_COUNTS, _SMALLEST = 2.0, 10.0
+# It lasts so long, and does not decay below this share meanwhile: what is struck rings shorter.
+LASTS_S, _KEPT = 1.0, 0.7
+# Where its velocity jumps, as at a wall, a slower periodic motion has overtones, at multiples k of its frequency, of no
+# more than this over k^2 of its width. They meet the multiple to so many Hz; of the slowest they are too close.
+_OVERTONE, _APART_HZ, _CLOSE_HZ = 3.5, 0.3, 2.5
+# Samples a second below which noise has too few lines for one to stand out.
+LEAST_RATE_HZ = 200.0
+
+Word = Literal["buzzes", "none seen", "cannot say"]
+
+
+@dataclass(frozen=True)
+class Buzz:
+    """The longest stretch of a recording that buzzes.
+
+    Attributes:
+        frequency_Hz, within_Hz: median of the windows', and half of what a window resolves.
+        from_s, to_s: half a second at most too early or late.
+        width_m: of the widest window, peak to peak.
+    """
+
+    frequency_Hz: float
+    within_Hz: float
+    from_s: float
+    to_s: float
+    width_m: float
+
+
+class BuzzFinder:
+    """Looks for a buzz in windows of half a second, in bounded memory but for a row a window.
+
+    Attributes:
+        longest_s: the longest part without a gap.
+        slow: the widest line slower than ``ABOVE_HZ``; None of a motion without one.
+    """
+
+    def __init__(self, period_s: float) -> None:
+        self._size = max(4, round(_WINDOW_S / period_s))
+        self.rate_Hz = 1.0 / period_s
+        self._t_s = self._x_m = np.empty(0)
+        self._begins_s = self.longest_s = 0.0
+        self.slow: Line | None = None
+        # Windows that swing, in stretches without one that does not or has another frequency.
+        self._stretches: list[list[tuple[float, float, Line]]] = [[]]
+
+    def add(self, piece: Samples) -> None:
+        """Takes a piece; its times tell a rate that its period is only about."""
+        if piece.begins:
+            self._t_s = self._x_m = np.empty(0)
+            self._begins_s = float(piece.t_s[0])
+            self._stretches.append([])
+        line = main_line(piece.x_m, self.rate_Hz)
+        if line and line.frequency_Hz < ABOVE_HZ and (self.slow is None or line.width > self.slow.width):
+            self.slow = line
+        self._t_s, self._x_m = np.append(self._t_s, piece.t_s), np.append(self._x_m, piece.x_m)
+        self.longest_s = max(self.longest_s, float(self._t_s[-1]) - self._begins_s)
+        while len(self._x_m) >= self._size:
+            self._look(self._t_s[: self._size], self._x_m[: self._size])
+            hop = self._size // 4
+            self._t_s, self._x_m = self._t_s[hop:], self._x_m[hop:]
+
+    def _look(self, t_s: Floats, x_m: Floats) -> None:
+        from_s, to_s = float(t_s[0]), float(t_s[-1])
+        line = swing(x_m, (len(t_s) - 1) / (to_s - from_s))
+        last = self._stretches[-1]
+        if last and not (line and abs(line.frequency_Hz - last[-1][2].frequency_Hz) < 1.0 / _WINDOW_S):
+            last = []
+            self._stretches.append(last)
+        if line:
+            # What begins within a window begins in its middle, give or take half of it.
+            begins_s = from_s if from_s == self._begins_s else (from_s + to_s) / 2.0
+            last.append((begins_s, to_s, line))
+
+    def buzz(self) -> Buzz | None:
+        """Returns the longest buzz; None where there was none, or nothing can be said."""
+        found = [buzz for stretch in self._stretches if (buzz := self._buzz(stretch))]
+        return max(found, key=lambda buzz: buzz.to_s - buzz.from_s, default=None)
+
+    def _buzz(self, stretch: list[tuple[float, float, Line]]) -> Buzz | None:
+        widths = [line.width for *_, line in stretch]
+        needed = round(4 * (LASTS_S - _WINDOW_S) / _WINDOW_S)
+        lasting = [i for i in range(len(widths) - needed) if widths[i + needed] >= _KEPT * max(widths[i : i + needed])]
+        if not lasting:
+            return None
+        kept = stretch[lasting[0] : lasting[-1] + needed + 1]
+        frequency_Hz = float(np.median([line.frequency_Hz for *_, line in kept]))
+        width_m = max(line.width for *_, line in kept)
+        if self.slow and _is_overtone(frequency_Hz, width_m, self.slow):
+            return None
+        return Buzz(frequency_Hz, 0.5 / _WINDOW_S, kept[0][0], kept[-1][1], width_m)
+
+    def word(self) -> Word:
+        """Returns whether the recording buzzes, as far as it can be said."""
+        if self.buzz():
+            return "buzzes"
+        return "none seen" if self.longest_s >= LASTS_S - 1e-9 and self.rate_Hz >= LEAST_RATE_HZ else "cannot say"
+
+
+def _is_overtone(frequency_Hz: float, width_m: float, of: Line) -> bool:
+    order = frequency_Hz / of.frequency_Hz
+    is_multiple = abs(order - round(order)) * of.frequency_Hz < _APART_HZ or of.frequency_Hz < _CLOSE_HZ
+    return is_multiple and width_m < _OVERTONE / order**2 * of.width
+
+
+def swing(x_m: Floats, rate_Hz: float) -> Line | None:
+    """Returns the swing of a window that is faster than a hand's, wider than the counts are, and felt."""
+    line = main_line(x_m, rate_Hz, ABOVE_HZ)
+    steps = np.abs(np.diff(x_m))
+    if line is None or line.share < _SHARE or not is_felt(line.width, line.frequency_Hz):
+        return None
+    return line if line.width > _COUNTS * np.percentile(steps[steps > 0.0], _SMALLEST) else None
