@@ -18,6 +18,7 @@ from haploop.protocol.scene.effects import Friction, Noise
 from haploop.protocol.scene.hand_force import Sine
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Hand, Scene, by_window
+from helpers.scenes.observed import observed
 
 
 def shipped(name: str, stiffnesses: Sequence[float], **tables) -> list[Scene]:
@@ -49,6 +50,7 @@ FAMILIES: dict[str, Callable[[], list[Scene]]] = {
     "trembling": trembling,
     "friction": rubbing,
     "swaying": swaying,
+    "observing": lambda: [observed(k, run={"verdict": "pushed"}) for k in (300.0, 1000.0, 2000.0)],
 }
 
 

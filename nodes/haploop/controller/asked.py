@@ -37,6 +37,10 @@ class Declared(NamedTuple):
         return self._replace(whole_ticks=whole, late_steps=late)
 
 
+# What an element asks for to be told the energies that ``Told`` keeps, in their order.
+ENERGIES = ("wall_energy", "own_energy", "output_energy", "total_energy")
+
+
 class Told(NamedTuple):
     """Memory of an element that asks: its own, and what is kept for it; a tree of numbers.
 

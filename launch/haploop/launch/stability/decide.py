@@ -116,6 +116,7 @@ class Finding:
             last one, or the hand stays.
         at_hardest: what it does there: rests, swings on, or undecided.
         settles_s: how long after the push it came within 5 % of where it rests; None of one that does not.
+        memory_drifts: whether what an element remembers still goes on changing where the loop rests; see ``drifts``.
     """
 
     word: str
@@ -138,23 +139,26 @@ class Finding:
     hardest_N: float | None = None
     at_hardest: str | None = None
     settles_s: float | None = None
+    memory_drifts: bool = False
     detail: str = ""
 
     @property
     def tells(self) -> bool:
         """Tells whether watching for longer would show nothing else."""
-        return self.word != "undecided" or self.why == "rests off the wall"
+        return (self.word != "undecided" or self.why == "rests off the wall") and not self.memory_drifts
 
     def after_blow(self, found: Finding) -> Finding:
         """Returns the finding with what was found after a harder push: undecided unless it rests then, too."""
         blown = found.why if found.why == "rests off the wall" else _DOES.get(found.word, "undecided")
-        struck = replace(self, blow_N=found.push_N, blown=blown)
+        drift = self.memory_drifts or found.memory_drifts
+        struck = replace(self, blow_N=found.push_N, blown=blown, memory_drifts=drift)
         return struck if blown.startswith("rests") else replace(struck, word="undecided", why="rested")
 
     def held_harder(self, hold_N: float, found: Finding) -> Finding:
         """Returns the finding with what was found at a harder hold: undecided unless it rests there, too."""
         does = _DOES.get(found.word, "undecided")
-        told = replace(self, hardest_N=abs(hold_N), at_hardest=does)
+        drift = self.memory_drifts or found.memory_drifts
+        told = replace(self, hardest_N=abs(hold_N), at_hardest=does, memory_drifts=drift)
         return told if does == "rests" else replace(told, word="undecided", why="rested")
 
     def without_friction(self, found: Finding) -> Finding:
@@ -183,6 +187,7 @@ class Finding:
         holds = {
             "only friction holds it": self.frictionless == "swings on",
             "perhaps only friction holds it": self.frictionless == "undecided",
+            "an element's memory still changes": self.memory_drifts,
             "at some holds of its hand": HAND_MOVES in beside,
             "noise shakes it": NOISE in beside and (seen_m or 0.0) > _SHAKEN_M,
             "its force ripples": (ripple_N or 0.0) > min(_RIPPLES * self.push_N, _RIPPLES_N),

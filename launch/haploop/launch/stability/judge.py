@@ -27,7 +27,9 @@ from haploop.launch.stability.looks import (
     push_of,
     watch_times,
 )
+from haploop.launch.stability.memory_drift import may_act
 from haploop.launch.stability.still_hand import End, StillHand, harder_hold, hold_of
+from haploop.launch.stability.swing import REST_M
 from haploop.logger.summary import Summary, finite, write_summary
 from haploop.plant.plant import Plant
 from haploop.protocol.changes import Event, is_change
@@ -180,7 +182,11 @@ def _watched(end: End, pushes_N: tuple[float, ...], looks_s: Sequence[float]) ->
             found = left_limit(push_N, seconds, wall, min(gone, key=len))
             break
         pushed = [each[None] for each in (copies[0].x, copies[-1].x, copies[-1].command)]
-        [found] = findings(pushed, end.time, wall, [end.scene], np.array([push_N]), last=seconds == times_s[-1])
+        last = seconds == times_s[-1]
+        [found] = findings(pushed, end.time, wall, [end.scene], np.array([push_N]), last=last)
+        if found.word == "steady":
+            acts = may_act(copies[-1].memory(), found.width_m >= REST_M, seconds, last=last)
+            found = replace(found, memory_drifts=bool(acts))
         if found.tells:
             break
     return found, copies[-1].x

@@ -22,8 +22,10 @@ from haploop.launch.stability.looks import (
     push_of,
     watch_times,
 )
+from haploop.launch.stability.memory_drift import may_act
 from haploop.launch.stability.still_batch import StillBatch
 from haploop.launch.stability.still_hand import harder_hold, hold_of
+from haploop.launch.stability.swing import REST_M
 from haploop.protocol.trees import tree_take
 from haploop.protocol.walls.wall import Wall
 
@@ -97,9 +99,13 @@ def _watched(
         pushed = [x[: len(here)], x[-len(here) :], command[-len(here) :]]
         scenes = [end.scenes[place] for place in members[here]]
         wall = _wall_of(end, members[here])
-        told = findings(pushed, end.time, wall, scenes, push_N[here], last=seconds == times_s[-1])
+        last, looks = seconds == times_s[-1], [numbers[:, -len(here) :] for numbers in copies.memory()]
+        told = findings(pushed, end.time, wall, scenes, push_N[here], last=last)
         for at, (place, finding) in enumerate(zip(here.tolist(), told, strict=True)):
             found[place] = finding
+            if finding.word == "steady":
+                acts = may_act([numbers[:, at] for numbers in looks], finding.width_m >= REST_M, seconds, last=last)
+                found[place] = replace(finding, memory_drifts=bool(acts))
             if finding.word == "limit-cycle":
                 cycles.append((place, pushed[1][at]))
         _keep(copies, found, count)

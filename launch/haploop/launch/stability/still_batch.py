@@ -11,6 +11,7 @@ from haploop.controller.recorder import BatchRecorder
 from haploop.launch.batch.batch import BatchEnd
 from haploop.launch.batch.loop import BatchLoop
 from haploop.launch.batch.stacking import stacked
+from haploop.launch.stability.memory_drift import look_ticks, memory_of
 from haploop.launch.stability.still_hand import held, push_ticks
 from haploop.plant.choose import make_motion
 from haploop.protocol.scene.scene import Scene
@@ -52,7 +53,7 @@ class StillBatch(BatchLoop):
         self._then = _held(scenes, hold_N)
         self._limit_m = np.array([scene.diverged_beyond for scene in scenes])
         self._tick, self._first = end.tick, end.tick + push_ticks(time.control_rate)
-        self._traces = np.empty((2, 0, len(member)))
+        self._traces, self._memory = np.empty((2, 0, len(member))), list[tuple[int, np.ndarray]]()
         # Friction might switch for ever in a copy that has left the limit.
         self._unheeded = 0.0 if scenes[0].friction else _UNHEEDED
         self._gone = np.zeros(len(member), bool)
@@ -74,13 +75,15 @@ class StillBatch(BatchLoop):
                 motion = make_motion(self._then, self._time, max(1, len(self.copy)))
                 motion.restore(self._motion.state, self._motion.last)
                 self._motion = motion
-                self._traces = self._traces[:, :0]
+                self._traces, self._memory = self._traces[:, :0], []
             left += self._go_until(self._first + round(seconds * self._time.control_rate))
         return left
 
     def _go_until(self, end: int) -> list[tuple[int, np.ndarray]]:
         ticks = self._traces.shape[1]
         more = np.empty((2, end - self._tick, len(self.copy)))
+        remembers = memory_of(self._controller, len(self.copy)).size
+        looks = look_ticks(ticks, ticks + more.shape[1]) if remembers else []
         self._traces = traces = np.concatenate([self._traces, more], axis=1)
         left: list[tuple[int, np.ndarray]] = []
         while self._tick < end and len(self.copy):
@@ -94,6 +97,8 @@ class StillBatch(BatchLoop):
                 if np.count_nonzero(self._gone) > self._unheeded * len(self._gone):
                     self.keep(~self._gone)
                     traces = self._traces
+            if ticks in looks:
+                self._memory.append((ticks, memory_of(self._controller, len(self.copy))))
             if self._tick % _FORGET_TICKS == 0:
                 self._forget()
         self._forget()
@@ -113,11 +118,16 @@ class StillBatch(BatchLoop):
         """Returns the commands at the ticks since the push, shape (copies, ticks), N."""
         return np.ascontiguousarray(self._traces[1].T)
 
+    def memory(self) -> list[np.ndarray]:
+        """Returns what elements remembered, at equal times from half the time since the push on, (numbers, copies)."""
+        return [numbers for ticks, numbers in self._memory if 2 * ticks >= self._traces.shape[1]]
+
     def keep(self, kept: np.ndarray) -> None:
         """Drops the copies for which ``kept``, shape (copies,), is false."""
         if kept.all():
             return
         self._traces, self.copy, self._gone = self._traces[..., kept], self.copy[kept], self._gone[kept]
+        self._memory = [(ticks, numbers[:, kept]) for ticks, numbers in self._memory]
         if len(self.copy):  # arrays of none would be taken for those that all share
             self._select(kept)
             self._limit_m, self._then = tree_select((self._limit_m, self._then), kept)

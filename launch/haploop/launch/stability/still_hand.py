@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from haploop.controller.controller import Controller
+from haploop.launch.stability.memory_drift import look_ticks, memory_of
 from haploop.plant.motion.hand_force import HandForce
 from haploop.plant.plant import Plant
 from haploop.protocol.scene.hand_force import Constant, constant_from_s
@@ -19,7 +20,6 @@ from haploop.protocol.ticks import Timebase
 PUSH_S = 0.05
 # A force of the hand is a hold where it lasts so long; of a run that many seconds at its end are looked through.
 _HOLD_S, _LATEST_S = 0.25, 60.0
-# Kinds of force that stay where they came to.
 # A hold that is harder by less than this is the same.
 _HARDER = 1.2
 
@@ -61,6 +61,7 @@ class StillHand:
         self._first, self._steps = end.plant.reached + push_ticks(self._rate), end.time.steps_per_tick
         self._then: Scene | None = held(end.scene, end.hold_N)
         self.x, self.command = np.zeros(0), np.zeros(0)
+        self._memory: list[tuple[float, np.ndarray]] = []
 
     @property
     def stop_reason(self) -> str | None:
@@ -79,7 +80,14 @@ class StillHand:
                 return
             self._plant, self._then = _went_on(self._then, self._time, self._plant), None
             self.x, self.command = np.zeros(0), np.zeros(0)
-        self._run_until(self._first + round(seconds * self._rate))
+        begun, end = len(self.x), round(seconds * self._rate)
+        for tick in look_ticks(begun, end) if memory_of(self._controller).size else [end]:
+            self._run_until(self._first + tick)
+            self._memory.append((len(self.x), memory_of(self._controller)))
+
+    def memory(self) -> list[np.ndarray]:
+        """Returns what its elements remembered at equal times, from half the time since the push on."""
+        return [numbers for ticks, numbers in self._memory if 2 * ticks >= len(self.x)]
 
     def _run_until(self, tick: int) -> None:
         commands: list[float] = []
