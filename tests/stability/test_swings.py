@@ -38,6 +38,14 @@ def test_growth_frequency_and_ripple_of_a_sine_are_its_own():
     assert ripple(force, rate) == pytest.approx(4.0, rel=0.02)
 
 
+@pytest.mark.parametrize("frequency", [6.3, 24.97, 25.5, 61.44, 320.2])
+def test_a_frequency_is_told_between_the_lines_of_its_spectrum(frequency: float):
+    """Half a second has a line every 2 Hz; a loop that swung at 25.0 Hz was said to swing at 26.0."""
+    t = np.arange(500) / 1000.0
+    x = 1e-4 * np.sin(2 * np.pi * frequency * t + 0.4) + 3e-4
+    assert frequency_Hz(x, 1000.0) == pytest.approx(frequency, abs=0.05)
+
+
 def test_the_force_ripple_is_that_of_the_last_quarter():
     """A buzz of the command that ends before it leaves none, though the swing of the device goes on."""
     t = np.arange(4000) / 1000.0

@@ -79,11 +79,22 @@ def trend_at(width: np.ndarray, t_s: np.ndarray, seconds: float, unsure: np.ndar
 def frequency_Hz(x: np.ndarray, rate: float) -> np.ndarray:
     """Returns the frequency at which x, sampled at ``rate`` in Hz, swings most; 0 for one that rests.
 
-    ``x`` is of shape (..., samples).
+    The lines of a spectrum lie 1 / duration apart; the peak between them is that of a parabola through the logarithms
+    of the highest and its neighbours, which under a window of Hann is right to 0.05 of that for a sine of three periods
+    or more.
+
+    Args:
+        x: shape (..., samples).
     """
     count = x.shape[-1]
-    power = np.abs(np.fft.rfft((x - x.mean(axis=-1, keepdims=True)) * np.hanning(count)))[..., 1:]
-    return np.where(power.any(axis=-1), np.fft.rfftfreq(count, 1.0 / rate)[1 + np.argmax(power, axis=-1)], 0.0)
+    power = np.abs(np.fft.rfft((x - x.mean(axis=-1, keepdims=True)) * np.hanning(count)))
+    peak, last = 1 + np.argmax(power[..., 1:], axis=-1), power.shape[-1] - 1
+    beside = [np.minimum(peak + i, last)[..., None] for i in (-1, 0, 1)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logs = [np.log(np.take_along_axis(power, line, axis=-1)[..., 0]) for line in beside]
+        between = 0.5 * (logs[0] - logs[2]) / (logs[0] - 2.0 * logs[1] + logs[2])
+    between = np.where((np.abs(between) <= 0.5) & (peak < last), between, 0.0)
+    return np.where(power[..., 1:].any(axis=-1), (peak + between) * rate / count, 0.0)
 
 
 def most_felt(x: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
