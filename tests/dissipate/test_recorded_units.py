@@ -109,6 +109,19 @@ def test_a_unit_of_recorded_rates_is_asked_after_too(tmp_path: Path) -> None:
     assert ["velocity of 188 m/s" in remarks[0], "acceleration of 9.81 km/s²" in remarks[1]] == [True, True], remarks
 
 
+def test_counts_are_asked_what_one_of_them_is_and_it_may_have_a_unit(tmp_path: Path) -> None:
+    path = write(tmp_path / "counts.csv", {"t (s)": T, "pos [counts]": X / 11e-6})
+    with pytest.raises(RecordingError, match='Give --unit: a unit, or m a count, as a number or text such as "11 um"'):
+        outcome(path, dampings=["1"])
+    with pytest.raises(RecordingError, match="A unit cannot be 0 m"):
+        outcome(path, dampings=["1"], layout=Layout(length="0 um"))
+    found = [
+        outcome(path, dampings=["1"], layout=Layout(length=count)).elements[0].true_J
+        for count in ("11e-6", "11 um", "45.056 mm / 4096")
+    ]
+    assert found[1:] == pytest.approx(2 * found[:1], rel=1e-12)
+
+
 def test_a_mass_that_may_be_in_grams_is_asked_after(plain: Path) -> None:
     assert any("a mass without a unit is in kg" in words for words in note_sentences(outcome(plain, masses=["1.8"])))
     assert not any("without a unit" in words for words in note_sentences(outcome(plain, masses=["1.8 g"])))

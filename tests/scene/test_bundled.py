@@ -142,8 +142,11 @@ def test_a_new_scene_never_takes_the_place_of_a_file_and_a_mistake_leaves_none()
     Path("kept.toml").write_text("kept")
     assert call("new", "kept.toml").exit_code == 2
     assert Path("kept.toml").read_text() == "kept"
-    assert call("new", "my.toml", "--wall", "stiff").exit_code == 2
-    assert not Path("my.toml").exists()
+    for wall in ("stiff", "3", "3 kg", "-1 N/mm"):
+        refused = call("new", "my.toml", "--wall", wall)
+        assert refused.exit_code == 2
+        assert f'--wall is "{wall}". It must be a stiffness with its unit' in refused.stderr
+        assert not Path("my.toml").exists()
     refused = call("new", "my.toml", "--device", "premium")
     assert refused.exit_code == 2
     assert "did you mean premium15?" in refused.stderr

@@ -106,13 +106,30 @@ def test_any_text_is_a_number_or_a_sentence(text):
     assert said.endswith(".") if isinstance(said, str) else math.isfinite(said)
 
 
+@pytest.mark.parametrize(
+    ("given", "unit", "sentence"),
+    [
+        ("85 gr", "kg", "gr is the grain, 65 mg; write g."),
+        ("85 gr cm^2", "kg m^2", "gr is the grain, 65 mg; write g."),
+        ("85 mgr", "kg", "mgr is a thousandth of the grain, 65 ng; write mg."),
+        ("1 ton", "kg", "ton is the short ton, 907 kg; write t, which is 1000 kg."),
+        ("12 Nm", "N", "Nm is a torque or an energy, but N is a force."),
+        ("12 mNm", "N/m", "mNm is a torque or an energy, but N/m is a stiffness."),
+    ],
+)
+def test_a_name_that_is_another_unit_than_is_mostly_meant_by_it_is_refused(given, unit, sentence):
+    with pytest.raises(PydanticCustomError) as refusal:
+        si(unit).read(given)
+    assert refusal.value.message() == sentence
+
+
 def test_units_of_the_table_are_those_of_pint_to_the_last_digit():
     units = pint.UnitRegistry(non_int_type=Decimal)  # pyright: ignore[reportArgumentType]
     compound = ["N/mm", "mN s/m", "kg*m**2/s^2", "m s⁻²", "cm²/ms", "m/s^2/Hz^0.5"]
     for name in [*_UNITS, *compound]:
         exact = _exact(name)
         assert exact, name
-        base = units.Quantity(Decimal(1), units.parse_units(name)).to_base_units()
+        base = units.Quantity(Decimal(1), units.parse_units(name.replace("Nm", "N*m"))).to_base_units()
         powers = dict(base.unit_items())
         assert exact[0] == tuple(powers.get(of, 0) for of in ("kilogram", "meter", "second", "radian")), name
         assert exact[1] == base.magnitude, name

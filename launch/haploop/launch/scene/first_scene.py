@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from haploop.launch.scene.bundled import bundled
+from haploop.launch.scene.number import from_text
 from haploop.launch.scene.toml_writer import inline
 from haploop.protocol.names import nearest
 
@@ -42,7 +43,7 @@ stiffness = {wall}
 
 
 class FirstSceneError(ValueError):
-    """A device or hand that is no file and does not come with haploop; the message says which do."""
+    """A wall that is no stiffness, or a device or hand that is no file and does not come with haploop."""
 
 
 def first_scene(device: str, hand: str, wall: str, folder: Path) -> str:
@@ -50,9 +51,17 @@ def first_scene(device: str, hand: str, wall: str, folder: Path) -> str:
 
     Args:
         device, hand: names that ``haploop scenes`` lists, or paths of files of one's own.
-        wall: stiffness with its unit, not checked.
+        wall: stiffness with its unit.
         folder: where the scene will be; files of one's own are named from there.
+
+    Raises FirstSceneError, whose message says what would do.
     """
+    try:
+        is_stiffness = from_text(wall, "N/m") >= 0
+    except ValueError:
+        is_stiffness = False
+    if not is_stiffness:
+        raise FirstSceneError(f'--wall is "{wall}". It must be a stiffness with its unit, such as --wall "0.5 N/mm".')
     return _TEXT.format(
         title=inline(f"{Path(device).stem} held by {Path(hand).stem} against a wall of {wall}"),
         device=inline(_source("--device", device, "devices", folder)),

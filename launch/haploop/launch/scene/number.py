@@ -92,8 +92,7 @@ def _refuse(sentence: str) -> NoReturn:
 
 
 _NUMBER = r"[+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
-# Products, quotients, one-digit powers and roots of names: no more of arithmetic is let through to pint, which would
-# do it.
+# Products, quotients, one-digit powers and roots of names: no more is let through to pint, which does arithmetic.
 _FACTOR = r"(?:[^\W\d]\w*|%|°)(?:(?:\*\*|\^)-?(?:0\.5|\d)|⁻?[¹²³⁴])?"
 _UNIT = rf"{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*"
 # One division by a number, after the amount or after its unit.
@@ -130,18 +129,18 @@ def name_and_unit(head: str) -> tuple[str, str]:
 def scale_of(unit: str, target: str) -> float:
     """Returns what numbers in a unit are multiplied by to be in ``target``; 1 for "".
 
-    Raises ValueError with a full sentence where the unit is none, or of another dimension. A number stands for itself.
+    A number stands for itself, and may have a unit: ``"11 um"`` a count. Raises ValueError with a full sentence.
     """
     if not unit:
         return 1.0
-    if is_number(unit):
-        if not math.isfinite(number := float(unit)) or not number:
-            raise ValueError(f"A unit cannot be {unit} {target}.")
-        return number
     try:
-        return float(from_text(f"1 {unit}", target))
+        text = unit if unit[0] in "+-.0123456789" else f"1 {unit}"
+        number = float(unit if is_number(unit) else from_text(text, target))
     except ValueError as error:
         raise ValueError(f"{unit!r} is no unit for numbers in {target}: {error}") from error
+    if not math.isfinite(number) or not number:
+        raise ValueError(f"A unit cannot be {number:g} {target}.")
+    return number
 
 
 def is_number(text: str) -> bool:
@@ -163,6 +162,7 @@ _PREFIXED = {
     "rad": ((0, 0, 0, 1), 0),
     "Hz": ((0, 0, -1, 0), 0),
     "N": ((1, 1, -2, 0), 0),
+    "Nm": ((1, 2, -2, 0), 0),  # to pint a count of yarn, a length over a mass
     "J": ((1, 2, -2, 0), 0),
     "W": ((1, 2, -3, 0), 0),
     "Pa": ((1, -1, -2, 0), 0),
@@ -215,6 +215,9 @@ def _dimension(exponents: Exponents) -> str:
 
 
 def _convert(amount: Decimal, unit: str, target: str) -> Decimal:
+    for _, name, _ in _PARTS.findall(unit):
+        if name in _TRAPS:
+            raise ValueError(_TRAPS[name])
     given, wanted = _exact(unit), _exact(target)
     if given is None or wanted is None:
         return _convert_any(amount, unit, target)
@@ -227,16 +230,16 @@ def _convert(amount: Decimal, unit: str, target: str) -> Decimal:
 
 # Quantities by their dimension, for whom N s/m says more than [mass] / [time].
 _QUANTITIES = {
-    "[length]": "a length",
-    "[mass]": "a mass",
-    "[time]": "a time",
-    "1 / [time]": "a rate",
-    "[length] / [time]": "a speed",
-    "[length] / [time] ** 2": "an acceleration",
-    "[mass] / [time]": "a damping",
-    "[mass] / [time] ** 2": "a stiffness",
-    "[length] * [mass] / [time] ** 2": "a force",
-}
+    "[length]": "a length", "[mass]": "a mass", "[time]": "a time", "1 / [time]": "a rate",
+    "[length] / [time]": "a speed", "[length] / [time] ** 2": "an acceleration",
+    "[mass] / [time]": "a damping", "[mass] / [time] ** 2": "a stiffness",
+    "[length] * [mass] / [time] ** 2": "a force", "[length] ** 2 * [mass] / [time] ** 2": "a torque or an energy",
+}  # fmt: skip
+# Names that pint takes for another unit of the same dimension than is mostly meant by them.
+_TRAPS = {
+    "gr": "gr is the grain, 65 mg; write g.", "mgr": "mgr is a thousandth of the grain, 65 ng; write mg.",
+    "ton": "ton is the short ton, 907 kg; write t, which is 1000 kg.",
+}  # fmt: skip
 
 
 def _another_dimension(unit: str, dimension: object, target: str, wanted: object) -> str:

@@ -117,7 +117,11 @@ class TextRecording:
             try:
                 scales[what] = scale_of(unit or column.unit, si)
             except ValueError as error:
-                raise RecordingError(str(error)) from error
+                option = "--unit" if what == "position" else f"--{what}-unit"
+                amount = "11 um" if what == "position" else f"0.1 {si}"
+                raise RecordingError(
+                    f'{error} Give {option}: a unit, or {si} a count, as a number or text such as "{amount}".'
+                ) from error
         return columns, scales
 
     @staticmethod
