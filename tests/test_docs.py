@@ -81,13 +81,26 @@ def test_every_anchor_that_a_document_links_to_is_in_the_page():
     assert lost == []
 
 
-def test_every_picture_of_readme_and_site_is_a_link_to_its_full_size():
+@pytest.fixture
+def hooks() -> Any:
+    """Loads the hooks of the site's build."""
     pytest.importorskip("mkdocs", reason="the site needs mkdocs: pip install 'haploop[docs]'")
     place = importlib.util.spec_from_file_location("site_hooks", HOUSE / "docs/site/hooks.py")
     assert place
     assert place.loader
     hooks = importlib.util.module_from_spec(place)
     place.loader.exec_module(hooks)
+    return hooks
+
+
+def test_the_site_has_no_page_whose_links_lead_nowhere_from_the_disk(hooks: Any, tmp_path: Path):
+    (tmp_path / "404.html").touch()
+    (tmp_path / "index.html").touch()
+    hooks.on_post_build({"site_dir": str(tmp_path)})
+    assert [path.name for path in tmp_path.iterdir()] == ["index.html"]
+
+
+def test_every_picture_of_readme_and_site_is_a_link_to_its_full_size(hooks: Any):
     files = SimpleNamespace(get_file_from_path=lambda path: path if (HOUSE / "docs" / path).exists() else None)
     seen = 0
     for name in ("index.md", "viewers.md", "paper_claims.md"):

@@ -1,7 +1,7 @@
 """Hooks of the documentation's build: pages from elsewhere in the repository, pages generated from code, links.
 
-MkDocs calls ``on_files`` and ``on_page_markdown``. Links that lead to no page, such as those to source files, become
-plain text: the site stands by itself.
+MkDocs calls the functions whose names begin with ``on_``. Links that lead to no page, such as those to source files,
+become plain text: the site stands by itself.
 """
 
 from __future__ import annotations
@@ -40,6 +40,11 @@ def on_files(files: Files, config: Any) -> Files:
     for page, make in reference.PAGES.items():
         files.append(File.generated(config, page, content=make()))
     return files
+
+
+def on_post_build(config: Any) -> None:
+    """Removes the theme's page of errors: its links are those of a server's root, and lead nowhere from the disk."""
+    Path(config["site_dir"], "404.html").unlink(missing_ok=True)
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:

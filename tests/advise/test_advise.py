@@ -11,11 +11,13 @@ from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.file import load
 from haploop.launch.stability.judge import judge_scene
 from haploop.protocol.scene.paths import value_at
-from haploop.tools.advise.advice import is_ideal
+from haploop.tools.advise.advice import advised_scene, is_ideal
 from haploop.tools.advise.families import DAMPING
 from haploop.tools.advise.known import PUBLISHED, formulas
 from haploop.tools.advise.report import assumes
-from haploop.tools.advise.subject import Assumed
+from haploop.tools.advise.search import Found
+from haploop.tools.advise.subject import Assumed, make_subject
+from haploop.tools.advise.walls.cases import make_loop
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.withstand import Best, rounded_down
 from haploop.tools.cli.app import app
@@ -27,6 +29,16 @@ def test_a_rigid_device_without_delay_is_ideal_and_one_with_a_cable_or_a_delay_i
     assert is_ideal(loop_of("premium15"))
     assert not is_ideal(loop_of("premium15_cable"))
     assert not is_ideal(loop_of("premium15", "clock.round_trip_delay=0.001"))
+
+
+@pytest.mark.parametrize(("delay", "title"), [("0 ms", "upper bound, 1 N/mm"), ("1 ms", "1 N/mm")])
+def test_the_scene_of_an_upper_bound_is_called_so_in_its_title(delay, title):
+    best = Best(DAMPING, (0.5,), Limit(1000.0, 1100.0))
+    found = Found((best,), best, 1000.0, None, None, 10)
+    subject = make_subject("premium15", delay=delay)
+    scene = advised_scene(subject, make_loop(subject.scene, False), found)
+    assert scene
+    assert scene.title.startswith(f"premium15: {title} with ")
 
 
 @pytest.mark.parametrize(

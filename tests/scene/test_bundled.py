@@ -95,6 +95,16 @@ def test_all_that_comes_with_haploop_is_listed_with_what_it_is():
             assert len(about(path)) > 20
 
 
+def test_what_comes_with_haploop_is_printed_by_its_name_and_can_be_copied():
+    for folder in FOLDERS:
+        for name, path in bundled(folder).items():
+            assert call("scenes", f"{folder}/{name}").stdout == path.read_text()
+    assert call("scenes", "premium15").stdout == bundled("devices")["premium15"].read_text()
+    unknown = call("scenes", "premium16")
+    assert unknown.exit_code == 2
+    assert "premium16 does not come with haploop" in unknown.stderr
+
+
 @pytest.mark.parametrize("device", bundled("devices"))
 @pytest.mark.parametrize("hand", bundled("hands"))
 def test_a_new_scene_of_every_device_and_hand_can_be_run_and_asks_for_the_wall_it_was_made_for(device, hand):

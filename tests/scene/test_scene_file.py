@@ -296,5 +296,7 @@ def test_an_encoder_has_its_resolution_or_both_bits_and_range(files):
     assert file_mistakes(path) == [
         "top.toml:5: encoder.bits is missing. An encoder has its resolution, or both bits and range."
     ]
+    said = file_mistakes(path, "encoder.counts=4096")
+    assert any('counts over 0.2 m are bits = 12 and range = "0.2 m"' in each for each in said)
     path.write_text(COUNTED + "resolution = 1e-6\n")
     assert file_mistakes(path)[0].startswith("top.toml:8: encoder.resolution stands beside bits or range.")

@@ -148,6 +148,13 @@ def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:
         return None
 
 
+# What is said by other keys than data sheets say it by.
+_SAID_BY: dict[KeyPath, str] = {
+    ("encoder", name): ' 4096 counts over 0.2 m are bits = 12 and range = "0.2 m", or resolution = "0.2 m / 4096".'
+    for name in ("counts", "cpr", "ppr")
+}
+
+
 def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Schema) -> None:
     """Adds a mistake that pydantic found, as a sentence; ``schema`` is that of the whole file."""
     rule = schema_at(schema, key, layers.data)
@@ -156,7 +163,9 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
             *table, name = key
             keys = list(schema_at(schema, tuple(table), layers.data).get("properties", {}))
             where = f"[{'.'.join(map(str, table))}]" if table else f"a {schema['title'].lower()}"
-            expected = f"Allowed: {', '.join(keys)}.{_heading(layers, schema, tuple(table), keys)}"
+            expected = (
+                f"Allowed: {', '.join(keys)}.{_heading(layers, schema, tuple(table), keys)}{_SAID_BY.get(key, '')}"
+            )
             layers.complain(key, expected, f"is not a key of {where}", nearest(name, keys))
         case "missing":
             layers.complain(key, f"It must be {_form(rule)}.{_of_a_device(layers, key)}", "is missing")

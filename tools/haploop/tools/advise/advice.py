@@ -155,7 +155,7 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
         without=without,
         assumed=tuple((of, by_number[of.key, 0.5], by_number[of.key, 2.0]) for of in assumed),
         own=own,
-        scene=_shown(subject, loop, found, found.stiffness_N_m, Case(1.0)),
+        scene=advised_scene(subject, loop, found),
         breaks=_breaking(subject, loop, found),
         runs=trial.runs,
     )
@@ -175,12 +175,20 @@ def is_ideal(loop: Scene) -> bool:
     return not lags and not loop.clock.round_trip_delay
 
 
-def _shown(subject: Subject, loop: Scene, found: Found, stiffness_N_m: float, case: Case) -> Scene | None:
-    """Returns a case on a wall with the advised element; None on no wall."""
+def advised_scene(subject: Subject, loop: Scene, found: Found) -> Scene | None:
+    """Returns the advised wall with its element, called an upper bound if it is one; None on no wall."""
+    return _shown(subject, loop, found, found.stiffness_N_m, Case(1.0), "upper bound, " if is_ideal(loop) else "")
+
+
+def _shown(
+    subject: Subject, loop: Scene, found: Found, stiffness_N_m: float, case: Case, called: str = ""
+) -> Scene | None:
+    """Returns a case on a wall with the advised element, called so in its title; None on no wall."""
     if not stiffness_N_m:
         return None
     best, scene = found.advised, case.scene(loop)
-    title = f"{subject.name}: {stiffness_N_m / 1e3:.3g} N/mm with {best.family.phrase(best.values)}, {case.words}"
+    wall_words = f"{called}{stiffness_N_m / 1e3:.3g} N/mm"
+    title = f"{subject.name}: {wall_words} with {best.family.phrase(best.values)}, {case.words}"
     assert scene.wall
     wall = replace(scene.wall, stiffness=stiffness_N_m)
     elements = best.family.elements(best.values)

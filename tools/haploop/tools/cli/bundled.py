@@ -10,10 +10,19 @@ import typer
 from haploop.tools.cli.options import FAILED, WRONG_USE, Json, leave, plain_errors, print_json
 
 
-def scenes(json: Json = False) -> None:
+def scenes(
+    name: Annotated[str | None, typer.Argument(help="print this one's file, to be copied", show_default=False)] = None,
+    json: Json = False,
+) -> None:
     """List the scenes, devices, hands and sweeps there are. Each is found by its name."""
-    from haploop.launch.scene.bundled import FOLDERS, about, bundled
+    from haploop.launch.scene.bundled import FOLDERS, about, bundled, of_name
 
+    if name is not None:
+        path = next(filter(None, (of_name(name, folder) for folder in FOLDERS)), None)
+        if path is None:
+            leave(f"{name} does not come with haploop; haploop scenes lists what does.", WRONG_USE)
+        print(path.read_text(encoding="utf-8"), end="")
+        return
     listed = {folder: {name: about(path) for name, path in bundled(folder).items()} for folder in FOLDERS}
     if json:
         print_json(listed)
