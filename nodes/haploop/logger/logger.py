@@ -183,7 +183,7 @@ class Logger:
             trouble: which element gave a force that is no finite number, or None.
             telemetry_gaps: ticks whose telemetry did not come.
         """
-        diverged = "; ".join(part for part in (trouble, reason) if part) or None
+        why = failed or "; ".join(part for part in (trouble, reason) if part)
         is_complete = self.tick >= self.time.ticks
         ended = "failed" if failed or trouble else "diverged" if reason else "done" if is_complete else "stopped"
         ticks, wall_s = self.tick - self._first_tick, wall_clock.perf_counter() - self._began
@@ -194,7 +194,7 @@ class Logger:
             "steps": ticks * self.time.steps_per_tick,
             "from_tick": self._first_tick,
             "ended": ended,
-            "why": failed or diverged or "",
+            "why": why,
             "final": {"x_m": float(self._end_state["x"][0]), "v_m_s": float(self._end_state["v"][0])},
             "lost": {"commands_dropped": 0, "commands_lost": 0, "telemetry_gaps": telemetry_gaps},
         }
@@ -217,6 +217,7 @@ class Logger:
         has_wall = self._scene.wall is not None
         energies = energy(books, accounts, has_wall) | self._balance()
         told = {"not_made": self._not_made} if self._not_made else {}
+        diverged = reason if ended == "diverged" else None
         return outcome(self._scene, ran, self._measured(), diverged, self._changed_s) | {"energy": energies} | told
 
     def _balance(self) -> dict[str, str]:

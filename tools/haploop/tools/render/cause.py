@@ -13,8 +13,10 @@ _BECAUSE = {
     "sampling_and_hold_J": "each force is held for a tick while the device moves on",
     "quantisation_J": "the encoder rounds the position that the wall answers to",
 }
-_NONE = "{when} the wall gave no more energy than it took: what moves here is not fed by the wall."
-_WALL = "{when} the wall gave the device {energy} more than it took, {share:.0f} % of it because {because}."
+_NONE = "{when} the wall gave no more energy than an ideal one would have: what moves here is not fed by the wall."
+_WALL = (
+    "{when} the wall gave the device {energy} more than an ideal one would have, {share:.0f} % of it because {because}."
+)
 _ELEMENT = "{when} {element} gave the device {energy}, more than the wall did."
 
 

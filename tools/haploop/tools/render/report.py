@@ -73,7 +73,8 @@ def summary_table(summary: Summary) -> RenderableType:
     if summary["verdict"] in SWINGS and (why := cause(summary["energy"])):
         parts.append(Text(f"Likely cause: {why}"))
     if summary["ended"] not in ("done", "diverged"):
-        parts.append(Text(f"ended early: {summary['ended']}", style="bold red"))
+        why = f", since {summary['why'].rstrip('.')}" if summary["ended"] == "failed" and summary["why"] else ""
+        parts.append(Text(f"ended early: {summary['ended']}{why}", style="bold red"))
     told_too = [*summary.get("not_made", ()), *filter(None, [summary["energy"].get("balance")])]
     parts += [Text(sentence, style="bold yellow") for sentence in told_too]
     parts += [Text(_ITS_WORD.format(words.split()[0])) for words, _ in program_rows(summary)]
