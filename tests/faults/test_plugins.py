@@ -11,6 +11,7 @@ import pytest
 import haploop.logger
 from haploop.launch.processes import run_directory
 from haploop.launch.runs.replay import replay
+from haploop.logger.summary import SUMMARY, read
 from helpers.live.launched import BRIEF, BRIEF_S, ROLES, SCENES, alive, command, first_and_slowly, pending, wait_for
 
 HEAD = """
@@ -70,6 +71,7 @@ def test_a_force_that_is_no_finite_number_fails_the_run_and_names_element_and_ti
     assert str(force[150]) == value
     assert np.isfinite(log["/plant"]["x"]).all(), "no device was ever given such a force"
     assert replay(run.out).differences == []
+    assert read(run.out / SUMMARY)["verdict"] == "undecided", "it says nothing of the loop"
 
 
 def test_a_force_that_is_no_finite_number_fails_a_run_in_one_process_too(launched, brake, tmp_path):

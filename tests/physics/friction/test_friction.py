@@ -55,6 +55,19 @@ def test_with_a_damper_it_stops_where_both_together_do():
     assert stopped == math.ceil(m / b * log * RATE)
 
 
+@pytest.mark.parametrize("damping", [2.0, 5.0])
+def test_a_friction_of_zero_neither_holds_nor_takes_anything(damping: float):
+    """A mass on a spring swings through rest again and again; a loop once failed as it switched there for ever."""
+    swinging = {
+        "duration": 1.5,
+        "device": {"mass": 0.1, "damping": damping, "position": 0.01},
+        "hand": {"mass": 0.0, "damping": 0.0, "stiffness": 500.0},
+    }
+    free, rubbed = run(scene(**swinging)), run(scene(**swinging, friction={"kinetic": 0.0}))
+    assert np.abs(rubbed.plant["x"] - free.plant["x"]).max() < 1e-17
+    assert friction_heat_J(rubbed) == 0.0
+
+
 def test_a_stopped_mass_stays_stopped_bit_by_bit():
     ran = sliding(0.05, 0.1, 0.48)
     at_rest = ran.plant["v"] == 0.0

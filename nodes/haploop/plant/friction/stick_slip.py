@@ -122,7 +122,7 @@ def decide_at_rest(of: StickSlip, mode: StickSlipState, z: Any, command: float, 
     if z[of.v] != 0.0:
         return mode
     force = row_on(of.force, z, command, load)
-    return StickSlipState(bool(holds_against(of.law, force)), math.copysign(1.0, force))
+    return StickSlipState(bool(holds_against(of.law, force) and of.law.holds_N > 0.0), math.copysign(1.0, force))
 
 
 def slipping(of: StickSlip, mode: StickSlipState) -> Any:

@@ -165,7 +165,7 @@ def solve_step(
             continue
         moved(tables, piece, begin, comp, command, friction, load_now, rise, next_z, next_comp)
         read(end, next_z)
-        if level < halving.finest and may_switch_within(
+        if (of.law.holds_N > 0.0 and level < halving.finest) and may_switch_within(
             of, mode, begin, end, command, load_now, load_then, friction, 1.0 / (1 << level)
         ):
             level += 1
@@ -210,7 +210,12 @@ def holds_after(
     of: StickSlip, mode: StickSlipState, tables: Any, piece: Place, z: Any, z_comp: Any, command: float,
     friction: float, load: float, rise: float, end_load: float,
 ) -> bool:  # fmt: skip
-    """Tells whether the mode still holds at the end of a piece, or v is no finite number, as ``holds_through``."""
+    """Tells whether the mode still holds at the end of a piece, or v is no finite number, as ``holds_through``.
+
+    Where friction is 0 there is nothing to switch.
+    """
+    if of.law.holds_N == 0.0:
+        return True
     v = one_moved(tables, piece, of.v, z, z_comp, command, friction, load, rise)
     if not mode.is_stuck:
         return mode.direction * v > 0.0 or not math.isfinite(v)
