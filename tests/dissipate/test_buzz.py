@@ -97,6 +97,11 @@ def test_what_a_hand_does_or_is_struck_is_no_buzz_be_it_rounded_or_not(name: str
         assert finder(counted(x)).word() == "none seen"
 
 
+def test_the_overtone_of_a_slower_swing_whose_frequency_changes_is_no_buzz() -> None:
+    phase = 2.0 * np.pi * (8.5 * S - 0.2 * S**2)
+    assert finder(1e-3 * np.sin(phase) + 2e-4 * np.sin(2.0 * phase) - 3e-3 * S).word() == "none seen"
+
+
 @pytest.mark.parametrize("period_s", [5e-3, 1e-3, 1e-4])
 def test_noise_is_no_buzz(period_s: float) -> None:
     for seed in range(8):
@@ -132,6 +137,14 @@ def test_the_buzz_is_the_first_thing_said_also_without_an_element(recording: Pat
     data = json.loads(CliRunner().invoke(app, ["dissipate", str(recording), "--json"]).stdout)
     assert (data["buzz_word"], data["elements"], data["figure"]) == ("buzzes", [], None)
     assert data["buzz"]["frequency_Hz"] == pytest.approx(31.0, abs=1.0) == data["main_Hz"]
+
+
+def test_a_swing_as_slow_as_a_hands_is_told_as_what_it_is(tmp_path: Path) -> None:
+    said = shown(
+        make_report(outcome(write(tmp_path / "slow.csv", {"t": S, "x": swing(8.0, 1e-3)}), dampings=["2"])), 200
+    )
+    assert said.startswith("No buzz was seen")
+    assert "It swings at 8 Hz, which a hand can, too." in said
 
 
 def test_the_advised_low_pass_leaves_the_swing_of_the_motion_in(recording: Path, tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from haploop.view.look.spectrum import Line, main_line
 ABOVE_HZ = 15.0
 # The spectrum is that of windows so long, a quarter of it apart.
 _WINDOW_S = 0.5
+_RESOLVED_HZ = 1.0 / _WINDOW_S
 # A swing at one frequency has so much of the variance of all that is faster than ``ABOVE_HZ``.
 _SHARE = 0.8
 # The staircase of an encoder swings by less than a count, here the step that nine of ten exceed.
@@ -84,7 +85,7 @@ class BuzzFinder:
         from_s, to_s = float(t_s[0]), float(t_s[-1])
         line = swing(x_m, (len(t_s) - 1) / (to_s - from_s))
         last = self._stretches[-1]
-        if last and not (line and abs(line.frequency_Hz - last[-1][2].frequency_Hz) < 1.0 / _WINDOW_S):
+        if last and not (line and abs(line.frequency_Hz - last[-1][2].frequency_Hz) < _RESOLVED_HZ):
             last = []
             self._stretches.append(last)
         if line:
@@ -108,7 +109,7 @@ class BuzzFinder:
         width_m = max(line.width for *_, line in kept)
         if self.slow and _is_overtone(frequency_Hz, width_m, self.slow):
             return None
-        return Buzz(frequency_Hz, 0.5 / _WINDOW_S, kept[0][0], kept[-1][1], width_m)
+        return Buzz(frequency_Hz, 0.5 * _RESOLVED_HZ, kept[0][0], kept[-1][1], width_m)
 
     def word(self) -> Word:
         """Returns whether the recording buzzes, as far as it can be said."""
@@ -117,9 +118,9 @@ class BuzzFinder:
         return "none seen" if self.longest_s >= LASTS_S - 1e-9 and self.rate_Hz >= LEAST_RATE_HZ else "cannot say"
 
 
-def _is_overtone(frequency_Hz: float, width_m: float, of: Line) -> bool:
+def _is_overtone(frequency_Hz: float, width_m: float, of: Line, apart_Hz: float = _APART_HZ) -> bool:
     order = frequency_Hz / of.frequency_Hz
-    is_multiple = abs(order - round(order)) * of.frequency_Hz < _APART_HZ or of.frequency_Hz < _CLOSE_HZ
+    is_multiple = abs(order - round(order)) * of.frequency_Hz < apart_Hz or of.frequency_Hz < _CLOSE_HZ
     return is_multiple and width_m < _OVERTONE / order**2 * of.width
 
 
@@ -128,5 +129,12 @@ def swing(x_m: Floats, rate_Hz: float) -> Line | None:
     line = main_line(x_m, rate_Hz, ABOVE_HZ)
     steps = np.abs(np.diff(x_m))
     if line is None or line.share < _SHARE or not is_felt(line.width, line.frequency_Hz):
+        return None
+    slower = main_line(x_m, rate_Hz)  # one whose frequency changes is none over more than a window
+    if (
+        slower
+        and slower.frequency_Hz < ABOVE_HZ
+        and _is_overtone(line.frequency_Hz, line.width, slower, 0.3 * _RESOLVED_HZ)
+    ):
         return None
     return line if line.width > _COUNTS * np.percentile(steps[steps > 0.0], _SMALLEST) else None

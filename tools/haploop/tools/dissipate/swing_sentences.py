@@ -20,6 +20,7 @@ _BUZZ: dict[Word, str] = {
         "second."
     ),
 }
+_SLOWER = " It swings at {main:.3g} Hz, which a hand can, too."
 _LOW_PASS = (
     "Low-pass the estimates, as by --set acceleration.cutoff={acceleration:.0f} or --set "
     "velocity.cutoff={velocity:.0f}, until the energy no longer depends on it."
@@ -41,7 +42,8 @@ def buzz_sentence(outcome: Outcome) -> str:
     limits = {"above": ABOVE_HZ, "lasts": LASTS_S, "rate": LEAST_RATE_HZ}
     if buzz := outcome.buzz:
         limits |= {"frequency": buzz.frequency_Hz, "within": buzz.within_Hz, "from_s": buzz.from_s, "to_s": buzz.to_s}
-    return _BUZZ[outcome.buzz_word].format(width=amount(outcome.buzz and outcome.buzz.width_m, "m"), **limits)
+    words = _BUZZ[outcome.buzz_word].format(width=amount(outcome.buzz and outcome.buzz.width_m, "m"), **limits)
+    return words + ("" if outcome.buzz or not outcome.main_Hz else _SLOWER.format(main=outcome.main_Hz))
 
 
 def filtered_out(outcome: Outcome) -> list[str]:
