@@ -15,7 +15,7 @@ from haploop.tools.render.units import prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure
 
 _COLUMNS = ("", "true", "sampled", "took", "gave back", "largest force")
 _AT = (0.04, 0.46, 0.585, 0.71, 0.835, 1.0)
@@ -23,17 +23,17 @@ _AT = (0.04, 0.46, 0.585, 0.71, 0.835, 1.0)
 _MOST = len(style.ELEMENTS)
 # Letters of a line, at most.
 _LINE_LETTERS = 170
-# Height of a line of notes.
-_LINE_IN = 0.17
+# Height of a line of notes, and of one of what is answered, and how many of these there are at most.
+_LINE_IN, _ANSWER_IN, _MOST_ANSWER_LINES = 0.17, 0.22, 4
 _CORNER: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.0, 1.0), "ncols": 1}
 
 
 def make_figure(outcome: Outcome) -> Figure:
     """Draws motion and energies, whole and in detail, the table, and notes; FigureError where matplotlib is missing."""
-    words = _words(outcome)
-    below_in = _LINE_IN * len(words)
-    figure = style.empty_figure(13.0, 8.0 + below_in)
-    parts = figure.subfigures(3, 1, squeeze=False, height_ratios=(0.8, 7.2, below_in))[:, 0]
+    words, answer = _words(outcome), _answer(outcome)
+    above_in, below_in = 0.4 + _ANSWER_IN * len(answer), _LINE_IN * len(words)
+    figure = style.empty_figure(13.0, above_in + 7.2 + below_in)
+    parts = figure.subfigures(3, 1, squeeze=False, height_ratios=(above_in, 7.2, below_in))[:, 0]
     header, body, below = parts
     lines, close = outcome.trace.lines(), outcome.trace.close
     lines_of_table = 1 + min(len(rows(outcome)), _MOST)
@@ -64,7 +64,10 @@ def make_figure(outcome: Outcome) -> Figure:
     _table(body.add_subplot(grid[2, :]), outcome, lines_of_table)
     look = {"fontsize": style.SMALL, "color": style.GREY}
     below.text(0.008, 1.0, "\n".join(words), va="top", gid="words", **look)
-    _header(header, outcome)
+    title = {"fontsize": style.LARGE, "color": style.INK, "va": "center", "gid": "title"}
+    header.text(0.008, 1.0 - 0.2 / above_in, outcome.recording.name, **title)
+    told = {"fontsize": style.TEXT + 1, "color": style.INK, "va": "top", "linespacing": 1.4, "gid": "answer"}
+    header.text(0.008, 1.0 - 0.42 / above_in, "\n".join(answer), **told)
     body.align_ylabels()
     return figure
 
@@ -164,10 +167,9 @@ def _words(outcome: Outcome) -> list[str]:
     return [line for sentence in notes for line in textwrap.wrap(sentence, _LINE_LETTERS)]
 
 
-def _header(figure: SubFigure, outcome: Outcome) -> None:
-    figure.text(0.008, 0.78, outcome.recording.name, fontsize=style.LARGE, color=style.INK, va="center", gid="title")
+def _answer(outcome: Outcome) -> list[str]:
+    """Returns the lines above the figure: whether the recording buzzes, and what the elements would have done."""
     sentence = conclusion(outcome)
-    words = textwrap.shorten(sentence[:1].upper() + sentence[1:], _LINE_LETTERS, placeholder=" …")
-    look = {"fontsize": style.TEXT + 1, "color": style.INK, "va": "center"}
-    figure.text(0.008, 0.42, buzz_sentence(outcome), gid="buzz", **look)
-    figure.text(0.008, 0.12, words, gid="answer", **look)
+    words = f"{sentence[:1].upper()}{sentence[1:]}"
+    room = {"max_lines": _MOST_ANSWER_LINES - 1, "placeholder": " …"}
+    return [buzz_sentence(outcome), *textwrap.wrap(words, _LINE_LETTERS, **room)]
