@@ -1,4 +1,4 @@
-"""Whether the memory of an element goes on changing while its loop is watched, so that it may act otherwise later."""
+"""Drift of what elements remember while their loop is watched, after which they may act otherwise."""
 
 from __future__ import annotations
 
