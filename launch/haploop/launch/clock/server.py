@@ -27,6 +27,8 @@ Command = Callable[[str, Message], Answer | Generator[None, None, Answer]]
 _AT_ONCE = 200
 # A frame of anybody but the run's own processes, bytes: what is larger takes ms to read.
 _LARGEST_OF_STRANGERS = 32 * 1024
+# Whoever holds nothing up is told no more often than this how far the others may go.
+_TOLD_S = 0.02
 
 
 class ClockServer:
@@ -61,7 +63,7 @@ class ClockServer:
         self.untold: list[str] = []
         self._sender = b""  # of a message of which frames are still to be taken
         self._greeted, self._start_gate = False, start_gate
-        self._granted, self._last_sent = -1, False
+        self._granted, self._last_sent, self._told_due = -1, False, 0.0
         self._awaited: list[tuple[bytes, Generator[None, None, Answer]]] = []
 
     @property
@@ -118,16 +120,21 @@ class ClockServer:
         return frame.name != "COMMAND"
 
     def grant(self) -> None:
-        """Sends every node how far it may go and what changes on the way, if that is news."""
-        clock = self._clock
-        until = clock.grant(self.roster.slowest(), self._machine.now(), self.roster.loop_tick())
+        """Sends every node how far it may go and what changes on the way, if that is news.
+
+        One that holds nothing up gets only some of the grants that change nothing else.
+        """
+        clock, now = self._clock, self._machine.now()
+        until = clock.grant(self.roster.slowest(), now, self.roster.loop_tick())
         events = clock.take_events()
         if until == self._granted and clock.is_last == self._last_sent and not events:
             return
         self._granted, self._last_sent = until, clock.is_last
         grant = encode("GRANT", until, clock.is_last, events)
+        if tells_all := bool(events) or clock.is_last or now >= self._told_due:
+            self._told_due = now + _TOLD_S
         for node in list(self.roster.nodes.values()):
-            if node.ready and not node.done:
+            if node.ready and not node.done and (tells_all or node.is_own or node.lossless):
                 self._send_frame(node.identity, grant)
 
     def probe(self, nodes: list[Node]) -> None:

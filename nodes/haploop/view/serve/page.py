@@ -70,8 +70,9 @@ class Page:
 
     async def _take(self, message: Viewport | Command | None) -> None:
         if message is None:
-            self._undrawn = max(0, self._undrawn - 1)
-            await self._send_snapshot()
+            was_full, self._undrawn = self._undrawn >= _MOST_UNDRAWN, max(0, self._undrawn - 1)
+            if was_full:
+                await self._send_snapshot()
             return
         if isinstance(message, Viewport):
             self._viewport = message

@@ -52,12 +52,16 @@ class Ring:
 
     def append(self, values: np.ndarray) -> None:
         """Appends values of shape (columns, count), ``count`` at most the capacity."""
-        count, used = values.shape[1], self.end - self.start
+        self.extend(values.shape[1])[:] = values
+
+    def extend(self, count: int) -> np.ndarray:
+        """Returns room for ``count`` values more, at most the capacity, (columns, count), which the caller fills."""
+        used = self.end - self.start
         if used + count > self._values.shape[1]:
             self._values[:, : self.capacity] = self._values[:, used - self.capacity : used]
             self.start, used = self.end - self.capacity, self.capacity
-        self._values[:, used : used + count] = values
         self.end += count
+        return self._values[:, used : used + count]
 
     def between(self, first: int, end: int) -> np.ndarray:
         """Returns a view of the values from number ``first`` to before ``end``, as far as held, (columns, count)."""

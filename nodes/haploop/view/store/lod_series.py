@@ -79,16 +79,13 @@ class LodSeries:
         if known >= rows:
             return
         self.begin(tick)
-        for missing in range(-known, 0, -self._at_once):
-            self._take(np.full((len(self._columns), min(missing, self._at_once)), np.nan))
+        if known < 0:
+            self._take(-known, {})
         for name in columns:
             if name not in self._columns:
                 self._open(name, columns.keys())
         known = max(0, known)
-        values = np.full((len(self._columns), rows - known), np.nan)
-        for name in self._columns.keys() & columns.keys():
-            values[self._columns[name]] = columns[name][known:]
-        self._take(values)
+        self._take(rows - known, {name: column[known:] for name, column in columns.items()})
 
     def _open(self, name: str, present: Collection[str]) -> None:
         """Adds a column; where there are too many, in place of the oldest that is not present any more."""
@@ -101,9 +98,12 @@ class LodSeries:
             for level in self._levels:
                 level.ring.clear(place)
 
-    def _take(self, values: np.ndarray) -> None:
-        for start in range(0, values.shape[1], self._at_once):
-            self._levels[0].ring.append(values[:, start : start + self._at_once])
+    def _take(self, rows: int, columns: Mapping[str, np.ndarray]) -> None:
+        for start in range(0, rows, self._at_once):
+            end = min(rows, start + self._at_once)
+            room = self._levels[0].ring.extend(end - start)
+            for name, place in self._columns.items():
+                room[place] = columns[name][start:end] if name in columns else np.nan
             self._propagate(0)
 
     def _propagate(self, depth: int) -> None:

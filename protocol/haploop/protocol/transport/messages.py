@@ -6,6 +6,7 @@ checking and the documentation in ``protocol/README.md`` derive from it.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 VERSION = 1
@@ -127,6 +128,7 @@ MESSAGES: dict[str, Message] = {
 BY_CODE: dict[int, str] = {message.code: name for name, message in MESSAGES.items()}
 
 
+@cache
 def required(name: str) -> int:
     """Returns the number of fields that a message has at least: those before the last that may be nil."""
     fields = MESSAGES[name].fields
@@ -139,7 +141,6 @@ def complaint(name: str, fields: list[object]) -> str | None:
     if not required(name) <= len(fields) <= len(expected):
         return f"{name} has {len(expected)} fields ({', '.join(n for n, _ in expected)}), but {len(fields)} came"
     for value, (field, kind) in zip(fields, expected, strict=False):
-        wrong_bool = isinstance(value, bool) and kind in ("int", "number")
-        if wrong_bool or not isinstance(value, _TYPES[kind]):
+        if type(value) not in _TYPES[kind]:  # True is no int here
             return f"{name}.{field} must be of type {kind}, but {type(value).__name__} came"
     return None

@@ -81,7 +81,7 @@ class Observer:
         if now >= self._report_due:
             self._report_due = now + _REPORT_S
             status = {"skipped_ticks": sum(self.skipped.values()), "garbled": self._streams.malformed}
-            self.client.progress(min(self.tick, self.client.until), status)
+            self.client.progress(self.tick, status)
         return frames
 
     def _note_events(self) -> None:

@@ -59,7 +59,8 @@ def decode(data: bytes) -> Frame:
     wrong = complaint(name, fields)
     if wrong:
         raise WireError(wrong + ".")
-    return Frame(name, fields + [None] * (len(MESSAGES[name].fields) - len(fields)))
+    left_out = len(MESSAGES[name].fields) - len(fields)
+    return Frame(name, fields + [None] * left_out if left_out else fields)
 
 
 def _describe(value: Any) -> str:
