@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from haploop.launch.scene.bundled import FOLDERS, about, bundled
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import SceneError
-from haploop.protocol.scene.hand_force import Ramp
+from haploop.protocol.scene.hand_force import Ramp, Sine
 from haploop.tools.advise.subject import assumptions
 from haploop.tools.cli.app import app
 from haploop.tools.sweep import sweep_file
@@ -129,6 +129,25 @@ def test_a_new_scene_takes_a_device_and_a_hand_of_ones_own_wherever_they_are():
     refused = call("new", "other.toml", "--device", "nowhere.toml")
     assert refused.exit_code == 2
     assert "'nowhere.toml' is no file, and none of that name comes with haploop" in refused.stderr
+
+
+def test_a_new_scene_says_nothing_anew_that_a_file_of_ones_own_says():
+    Path("beneath.toml").write_text('[clock]\nround_trip_delay = "1 ms"\n')
+    Path("device.toml").write_text(
+        'extends = "beneath.toml"\nduration = 5\n[device]\nmass = 0.1\ndamping = 0.1\n[wall]\nstiffness = 700\n'
+        '[hand.force]\nkind = "sine"\namplitude = "1 N"\nfrequency = "2 Hz"\n'
+    )
+    assert call("new", "my.toml", "--device", "device.toml").exit_code == 0
+    scene = load("my.toml")
+    assert scene.wall
+    assert scene.hand
+    assert (scene.clock.round_trip_delay, scene.duration, scene.wall.stiffness) == (1e-3, 5.0, 700.0)
+    assert scene.hand.force == Sine(amplitude=1.0, frequency=2.0)
+    assert '# round_trip_delay = "1 ms"  # of beneath.toml' in Path("my.toml").read_text()
+    call("new", "asked.toml", "--device", "device.toml", "--wall", "2 N/mm")
+    asked = load("asked.toml")
+    assert asked.wall
+    assert (asked.clock.round_trip_delay, asked.wall.stiffness) == (1e-3, 2000.0)
 
 
 def test_what_its_comments_offer_can_be_run_too():

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
+from typing import Any
 
 from haploop.launch.scene.bundled import bundled
+from haploop.launch.scene.layers import Layers, read_layers
 from haploop.launch.scene.number import from_text
 from haploop.launch.scene.toml_writer import inline
 from haploop.protocol.names import nearest
+from haploop.protocol.scene.table import Tables
 
 _TEXT = """\
 # A scene for haploop. What it does not say it takes from the files it extends; what they do not say is left out of the
@@ -46,38 +50,85 @@ class FirstSceneError(ValueError):
     """A wall that is no stiffness, or a device or hand that is no file and does not come with haploop."""
 
 
-def first_scene(device: str, hand: str, wall: str, folder: Path) -> str:
+def first_scene(device: str, hand: str, wall: str | None, folder: Path) -> str:
     """Returns a scene in which a hand moves a device into a wall and holds it there.
+
+    What the files of device and hand say of the rest stands in it as a comment, so that it is not said anew.
 
     Args:
         device, hand: names that ``haploop scenes`` lists, or paths of files of one's own.
-        wall: stiffness with its unit.
+        wall: stiffness with its unit; None for that of the files, 0.5 N/mm without one.
         folder: where the scene will be; files of one's own are named from there.
 
-    Raises FirstSceneError, whose message says what would do.
+    Raises:
+        FirstSceneError: what was given cannot be used; the message says what would do.
+        SceneError: the file of device or hand cannot be read.
     """
+    files = [_source("--device", device, "devices"), _source("--hand", hand, "hands")]
+    said = read_layers(files[0])
+    for file in files[1:]:
+        said.lay(read_layers(file).data, str(file))
+    if wall is None:
+        known = _table(said, ("wall",)).get("stiffness", "0.5 N/mm")
+        wall = known if isinstance(known, str) else f"{known} N/m"
+    else:
+        _table(said, ("wall",)).pop("stiffness", None)
     try:
         is_stiffness = from_text(wall, "N/m") >= 0
     except ValueError:
         is_stiffness = False
     if not is_stiffness:
         raise FirstSceneError(f'--wall is "{wall}". It must be a stiffness with its unit, such as --wall "0.5 N/mm".')
-    return _TEXT.format(
-        title=inline(f"{Path(device).stem} held by {Path(hand).stem} against a wall of {wall}"),
-        device=inline(_source("--device", device, "devices", folder)),
-        hand=inline(_source("--hand", hand, "hands", folder)),
-        wall=inline(wall),
+    return _left_to_files(
+        _TEXT.format(
+            title=inline(f"{Path(device).stem} held by {Path(hand).stem} against a wall of {wall}"),
+            device=inline(_named(files[0], "devices", folder)),
+            hand=inline(_named(files[1], "hands", folder)),
+            wall=inline(wall),
+        ),
+        said,
     )
 
 
-def _source(option: str, name: str, kind: str, folder: Path) -> str:
+def _left_to_files(text: str, said: Layers) -> str:
+    """Returns the text with every key as a comment that the files say; all of a table that names another kind there."""
+    lines, table, at = list[str](), (), _table(said, ())
+    for line in text.splitlines():
+        if header := re.fullmatch(r"\[([\w.]+)\].*", line):
+            table = tuple(header[1].split("."))
+            at = _table(said, table)
+        elif key := re.match(r"(\w+) = ", line):
+            if key[1] in at and key[1] not in ("title", "extends"):
+                line = f"# {key[1]} = {inline(at[key[1]])}  # of {Path(said.origin((*table, key[1]))).name}"
+            elif "kind" in at and table != ("wall",):
+                line = f"# {line}"
+        lines.append(line)
+    return "\n".join([*lines, ""])
+
+
+def _table(said: Layers, path: tuple[str, ...]) -> Tables:
+    """Returns the table of this name; an empty one where there is none, or something else."""
+    found: Any = said.data
+    for name in path:
+        found = found.get(name) if isinstance(found, dict) else None
+    return found if isinstance(found, dict) else {}
+
+
+def _source(option: str, name: str, kind: str) -> Path:
     known = bundled(kind)
     if name in known:
-        return f"{kind}/{name}.toml"
+        return known[name]
     if Path(name).is_file():
-        return Path(os.path.relpath(name, folder)).as_posix()
+        return Path(name)
     meant = nearest(name, known)
     hint = f"; did you mean {meant}?" if meant else "."
     raise FirstSceneError(
         f"{option} {name!r} is no file, and none of that name comes with haploop{hint} These do: {', '.join(known)}."
     )
+
+
+def _named(file: Path, kind: str, folder: Path) -> str:
+    """Returns a file as ``extends`` names it."""
+    if file in bundled(kind).values():
+        return f"{kind}/{file.name}"
+    return Path(os.path.relpath(file, folder)).as_posix()

@@ -39,7 +39,12 @@ def new(
         str, typer.Option(metavar="NAME", help="that haploop scenes lists, or a file of yours")
     ] = "premium15",
     hand: Annotated[str, typer.Option(metavar="NAME", help="likewise")] = "fu_cavusoglu_y",
-    wall: Annotated[str, typer.Option(metavar="STIFFNESS", help="stiffness of the wall")] = "0.5 N/mm",
+    wall: Annotated[
+        str | None,
+        typer.Option(
+            metavar="STIFFNESS", help="stiffness of the wall; else that of the files, or 0.5 N/mm", show_default=False
+        ),
+    ] = None,
 ) -> None:
     """Write a commented scene to start from. A hand moves a device into a wall and holds it there."""
     from haploop.launch.scene.file import load
