@@ -68,3 +68,16 @@ def tap(effects: Iterable[str], **more: Any) -> Scene:
             adds = isinstance(value, dict) and "kind" not in value
             tables[name] = {**tables.get(name, {}), **value} if adds else value
     return scene(**tables)
+
+
+def creeping() -> Scene:
+    """Comes to rest on an overdamped hand: without rounding v would fall for ever, and never be 0."""
+    force, grip = {"kind": "constant", "value": -0.24}, {"stiffness": 772.0, "damping": 1.3}
+    hand = {"mass": 0.1, "damping": 9.5, "stiffness": 190.0, "force": force, "grip": grip}
+    return scene(
+        duration=1.0,
+        device={"mass": 0.022, "damping": 0.07},
+        hand=hand,
+        friction={"kinetic": 0.043},
+        wall={"position": -1.0, "stiffness": 100.0},
+    )

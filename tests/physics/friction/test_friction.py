@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from haploop.plant.friction import motion, substeps
 from helpers.runs.captured import run
-from helpers.scenes.effect_tables import slowly
+from helpers.scenes.effect_tables import creeping, slowly
 from helpers.scenes.least import scene
 
 RATE = 10_000
@@ -74,6 +75,32 @@ def test_a_stopped_mass_stays_stopped_bit_by_bit():
     first = int(np.argmax(at_rest))
     assert at_rest[first:].all()
     assert len(np.unique(ran.plant["x"][first:])) == 1
+
+
+def test_a_mass_that_creeps_to_rest_under_friction_sticks_and_stays_bit_by_bit():
+    """A loop once hunted for ever for the instant of a stop, as v was rounding, and changed its sign with it."""
+    ran = run(creeping())
+    last = int(np.flatnonzero(ran.plant["v"])[-1])
+    assert 1e-17 < abs(ran.plant["v"][last]) < 1e-15  # rounding is 1e-19
+    assert ran.plant["stuck"][last + 1 :].all()
+    assert len(np.unique(ran.plant["x"][last + 1 :])) == 1
+    assert ran.relative_residual < 1e-12
+
+
+def test_a_hunt_for_a_stop_ends_though_the_speed_is_rounding(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(motion.LOOPS, "pays", np.inf)
+    for module in (motion, substeps):
+        monkeypatch.setattr(module, "creeps", lambda _of, _mode, v: np.zeros(np.shape(v), bool))
+    ran = run(creeping())
+    assert ran.plant["v"][-1] == 0.0
+    assert np.bincount(ran.plant["pieces.step"].astype(int)).max() < 70
+
+
+def test_who_has_friction_switch_too_often_is_told_what_helps(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(motion.LOOPS, "pays", np.inf)
+    monkeypatch.setattr(substeps, "_MOST_PIECES", 3)
+    with pytest.raises(ArithmeticError, match=r"took 3 pieces. Raise clock.plant_rate where a body swings many times"):
+        run(scene(duration=0.1, device={"mass": 0.05, "damping": 0.0, "velocity": 0.1234}, friction={"kinetic": 0.5}))
 
 
 # Sticking

@@ -14,7 +14,7 @@ from haploop.protocol.scene.effects import Friction
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Scene
 from helpers.runs.batches import alone, together, with_stiffness
-from helpers.scenes.effect_tables import tap
+from helpers.scenes.effect_tables import creeping, tap
 
 pytestmark = pytest.mark.slow
 STRIBECK = {"kinetic": 0.03, "breakaway": 0.05, "stribeck_velocity": 0.01}
@@ -25,6 +25,7 @@ SCENES: dict[str, dict[str, Any]] = {
     "breakaway": {"friction": {"kinetic": 0.03, "breakaway": 0.06}},
     "Stribeck": {"friction": STRIBECK, "also": ("transmission", "bandwidth")},
     "steps cut into parts": {"also": ("transmission",), "stiffness_N_m": 2e6},
+    "a creep to rest": {"scene": creeping()},
     "jitter": {"also": ("transmission", "grip", "jitter", "loss")},
 }
 
@@ -41,6 +42,8 @@ def loops(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 def scene_of(name: str) -> Scene:
     of = SCENES[name]
+    if "scene" in of:
+        return of["scene"]
     tables = {"friction": of["friction"]} if "friction" in of else {}
     scene = tap(("friction", *of.get("also", ())), duration=0.12, **tables)
     return with_value(scene, "transmission.stiffness", of["stiffness_N_m"]) if "stiffness_N_m" in of else scene
@@ -73,6 +76,13 @@ def test_so_has_a_batch_whatever_room_there_is_for_the_pieces(
         monkeypatch.setattr(loops.loops, "_PIECES", room)
     assert by(0, monkeypatch, scenes, batch=True) == expected
     assert by(0, monkeypatch, scenes) == expected
+
+
+def test_so_have_batches_that_creep_to_rest(loops: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    scenes = [replace(creeping(), friction=Friction(kinetic=kinetic)) for kinetic in (0.043, 0.03)]
+    expected = by(np.inf, monkeypatch, scenes)
+    assert by(np.inf, monkeypatch, scenes, batch=True) == expected
+    assert by(0, monkeypatch, scenes, batch=True) == expected
 
 
 def test_a_step_that_there_is_no_room_for_is_never_taken_for_done(loops: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,9 +16,12 @@ from haploop.plant.friction.step_loop import (
     NONE,
     STATES,
     add_up,
+    creeps,
     decide_at_rest,
+    holds_against,
     holds_through,
     may_switch_within,
+    row_on,
     slipping,
     slipping_at,
     solve_step,
@@ -65,6 +68,8 @@ def _follow(of, mode, held, forced, course, loads, ends, begin, y, comp, z, afte
             if not holds_through(of, mode, after, command, end_load):
                 return step
             if mode.is_stuck and not holds_through(of, mode, z, command, load):
+                return step
+            if creeps(of, mode, after[of.v]) and holds_against(of.law, row_on(of.force, after, command, end_load)):
                 return step
             if may_switch_within(of, mode, z, after, command, load, end_load, friction, 1.0):
                 return step

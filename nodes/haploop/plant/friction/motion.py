@@ -13,9 +13,12 @@ from haploop.plant.friction.stick_slip import (
     Friction,
     RubbingHistory,
     StickSlip,
+    creeps,
     decide_at_rest,
+    holds_against,
     holds_through,
     may_switch_within,
+    row_on,
     slipping,
     slipping_at,
 )
@@ -39,9 +42,10 @@ class FrictionMotion(RubbingHistory, ChainMotion):
 
     Body 0 slips in a direction +-1 under friction -direction F, or is stuck: then it is clamped, v is exactly 0.0 and
     x stays, while the rest of the chain follows the clamped system. It slips until v changes its sign; there it sticks
-    if the other forces on it are within the breakaway force, else it slips where they pull. It is stuck until they
-    exceed the breakaway force. An interval in which nothing switches is one linear motion, as without friction; any
-    other, and every one of a scene too stiff or with too curved a law for that, is solved step by step.
+    if the other forces on it are within the breakaway force, else it slips where they pull; where it ``creeps``, it
+    sticks, too. It is stuck until they exceed the breakaway force. An interval in which nothing switches is one linear
+    motion, as without friction; any other, and every one of a scene too stiff or with too curved a law for that, is
+    solved step by step.
     """
 
     _course: Course | None = None
@@ -158,6 +162,8 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         holds = holds_through(of, mode, ends, command, end_load)
         if mode.is_stuck:
             holds &= holds_through(of, mode, starts, command, load)
+        elif (slow := creeps(of, mode, ends[of.v])).any():
+            holds &= ~(slow & holds_against(of.law, row_on(of.force, ends, command, end_load)))
         return holds & ~may_switch_within(of, mode, starts, ends, command, load, end_load, friction, 1.0)
 
     def _solve(

@@ -61,7 +61,7 @@ def _one_moved(tables, of, at, z, z_comp, command, friction, load, rise):  # pra
 
 
 @_inlined
-def _row_on(row, z, command, load):  # pragma: no cover
+def row_on(row, z, command, load):  # pragma: no cover
     total = row.of_command * command + row.of_load * load
     for i in range(STATES):
         if row.of_states[i] != 0.0:
@@ -125,21 +125,26 @@ def _note(pieces, of, head, begin, comp):  # pragma: no cover
             pieces[at, 6 + size + i] = comp[i]
 
 
-_friction_at, _against = _inlined(stick_slip.friction_at), _inlined(stick_slip.holds_against)
-_forces = {"row_on": _row_on, "holds_against": _against}
+_friction_at, holds_against = _inlined(stick_slip.friction_at), _inlined(stick_slip.holds_against)
+_forces = {"row_on": row_on, "holds_against": holds_against}
 decide_at_rest = _inlined(stick_slip.decide_at_rest, **_forces)
 holds_through = _inlined(stick_slip.holds_through, **_forces)
 _tangents = _inlined(stick_slip.tangents_meet_below)
-may_switch_within = _inlined(stick_slip.may_switch_within, row_on=_row_on, tangents_meet_below=_tangents)
+may_switch_within = _inlined(stick_slip.may_switch_within, row_on=row_on, tangents_meet_below=_tangents)
+creeps = _inlined(stick_slip.creeps)
 slipping = _inlined(stick_slip.slipping)
 slipping_at = _inlined(stick_slip.slipping_at, friction_at=_friction_at)
 solve_step = _code.compiled(
     substeps.solve_step,
     decide_at_rest=decide_at_rest,
     may_switch_within=may_switch_within,
+    creeps=creeps,
     friction_over=_inlined(substeps.friction_over, friction_at=_friction_at, one_moved=_one_moved),
-    holds_after=_inlined(substeps.holds_after, holds_against=_against, one_moved=_one_moved, force_moved=_force_moved),
+    holds_after=_inlined(
+        substeps.holds_after, holds_against=holds_against, one_moved=_one_moved, force_moved=_force_moved
+    ),
     at_rest=_inlined(substeps.at_rest),
+    **_forces,
     moved=_moved,
     take_over=_take_over,
     numbers=_same,

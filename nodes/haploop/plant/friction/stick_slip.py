@@ -142,6 +142,16 @@ def holds_through(of: StickSlip, mode: StickSlipState, z: Any, command: Any, loa
     return mode.direction * z[of.v] > 0.0
 
 
+def creeps(of: StickSlip, mode: StickSlipState, v: Any) -> Any:
+    """Tells whether body 0 slips so slowly that the margin of the breakaway force would stop it within a plant step.
+
+    That is at rest, wherever friction holds the other forces as well. A device on a damped hand whose friction is the
+    same at every speed comes to rest like this: it creeps, v = c exp(-t / T), and never reaches 0. Its v would end as
+    the rounding of what moves it, and change its sign with that.
+    """
+    return (not mode.is_stuck) & (abs(v) < _MARGIN * of.speed_up * of.law.holds_N)
+
+
 def may_switch_within(
     of: StickSlip, mode: StickSlipState, begin: Any, end: Any, command: Any, load: Any, end_load: Any, friction: Any,
     part: float,

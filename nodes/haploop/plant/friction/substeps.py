@@ -14,10 +14,12 @@ from haploop.plant.chain.transition import of_device
 from haploop.plant.friction.stick_slip import (
     Row,
     StickSlip,
+    creeps,
     decide_at_rest,
     friction_at,
     holds_against,
     may_switch_within,
+    row_on,
 )
 from haploop.protocol.scene.scene import Scene
 
@@ -25,7 +27,8 @@ from haploop.protocol.scene.scene import Scene
 _HALVINGS = 32
 # No piece is longer than this part of a radian of the fastest mode, so that no reversal hides between its ends.
 _RADIANS = 0.5
-_MOST_PIECES = 1_000_000
+# Five times what the stiffest chain takes that a scene may have; half a second.
+_MOST_PIECES = 40_000
 # More parts of a plant step than this are no way to simulate: the plant rate is too low.
 MOST_PARTS = 4096
 
@@ -115,11 +118,12 @@ def drop_last(pieces: Pieces) -> None:
 
 
 def is_full(pieces: Pieces, first: int, step: int) -> bool:
-    """Tells whether no further piece can be noted; raises ArithmeticError for a million in a step."""
+    """Tells whether no further piece can be noted; raises ArithmeticError for too many in a step."""
     if len(pieces) - first > _MOST_PIECES:
         raise ArithmeticError(
-            f"Friction switched so often in plant step {step} that it took {_MOST_PIECES} pieces; "
-            "raise clock.plant_rate."
+            f"Friction switched so often in plant step {step} that it took {_MOST_PIECES} pieces. Raise "
+            "clock.plant_rate where a body swings many times in a plant step; where none does, haploop is wrong: "
+            "report the scene."
         )
     return False
 
@@ -133,6 +137,10 @@ def solve_step(
     A piece of the step is moved by the exact transition. If the mode no longer holds at its end, or may have ceased
     within it, the piece is halved, until the switch lies within h / 2^32; there the mode changes, and v is set to
     exactly 0.0. The kinetic energy which that throws away, of the order of 1e-20 of what moves, is heat of friction.
+    A hunt for a switch ends with one: where the pieces say at its end that the mode still holds, and the one long piece
+    said that it does not, they differ by rounding, and v, or what friction could hold beyond the forces, is no more
+    than that. (With a Stribeck velocity long pieces err by more: a slip then goes on.) A slip that ``creeps`` stops,
+    too, where friction holds the other forces.
     With a Stribeck velocity every piece has the friction of the speed foreseen for its middle: second order in h.
     Whether the mode holds at the end of a piece few states tell, so that only a piece that is kept is moved as a whole.
 
@@ -144,7 +152,7 @@ def solve_step(
         next_z, next_comp: room for states on the way.
 
     Raises:
-        ArithmeticError: friction switched so often that it took a million pieces.
+        ArithmeticError: friction switched so often that it took 40 000 pieces.
     """
     mode = decide_at_rest(of, mode, z, command, load)
     first = count_of(pieces)
@@ -161,7 +169,7 @@ def solve_step(
         friction = friction_over(of, mode, tables, level + 1, begin, comp, command, load_now, rise)
         holds = holds_after(of, mode, tables, piece, begin, comp, command, friction, load_now, rise, load_then)
         if not holds and level < halving.finest:
-            level, hunted_to = level + 1, rest if hunted_to < 0 else hunted_to
+            level, hunted_to = level + 1, rest
             continue
         moved(tables, piece, begin, comp, command, friction, load_now, rise, next_z, next_comp)
         read(end, next_z)
@@ -173,9 +181,14 @@ def solve_step(
         if left == whole:
             begun_with, was_stuck = friction, mode.is_stuck
         stuck_in_it, snap_J = mode.is_stuck, 0.0
+        if hunted_to < 0 and creeps(of, mode, end[of.v]):
+            holds = holds and not holds_against(of.law, row_on(of.force, end, command, load_then))
+        elif rest == hunted_to:
+            holds = holds and not stuck_in_it and of.law.stribeck_m_s != 0.0
         if not holds:
             snap_J = at_rest(of, next_z, next_comp)
             mode = decide_at_rest(of, mode, next_z, command, load_then)
+            mode = StickSlipState(mode.is_stuck and not stuck_in_it, mode.direction)
         note(pieces, of, (step, level, stuck_in_it, friction, load_now, snap_J), begin, comp)
         left = rest
         take_over(z, z_comp, next_z, next_comp)
@@ -184,7 +197,8 @@ def solve_step(
         if not holds or left <= hunted_to:
             level, hunted_to = halving.coarsest, -1
         elif hunted_to >= 0:
-            level = min(level + 1, halving.finest)
+            while level < halving.finest and 2 << (halving.finest - level) > left - hunted_to:
+                level += 1
         if is_full(pieces, first, step):
             break
     if not left and count_of(pieces) == first + 1:  # one that was broken off for want of room is not done
