@@ -4,7 +4,7 @@ import pytest
 from playwright.sync_api import expect
 
 from helpers.live.browser import DESK, IN_BOTH, PHONE, still
-from helpers.live.launched import first_and_slowly
+from helpers.live.launched import first_and_slowly, wait_for
 from helpers.live.stand_in import ENDED, RUNNING, RUNS, SUMMARY
 from oracles.snapshots import contact
 
@@ -213,7 +213,7 @@ def test_light_and_dark_change_places_while_the_page_is_open(stand_in, open_page
     }"""
     assert page.evaluate(brightness) == "dark lines"
     page.emulate_media(color_scheme="dark")
-    page.wait_for_function(f"({brightness})() === 'light lines'")
+    wait_for("light lines", lambda: page.evaluate(brightness) == "light lines")
 
 
 @pytest.mark.slow

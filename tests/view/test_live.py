@@ -1,6 +1,7 @@
 """The page of a real run: it shows what was logged, what it asks for is done or refused, and the run does not mind."""
 
 import asyncio
+from itertools import pairwise
 
 import aiohttp
 import numpy as np
@@ -172,6 +173,27 @@ def test_a_paused_run_sends_its_snapshot_once(tmp_path):
         assert tab.snapshots == seen + 1
 
     follow(play, tmp_path, pauses=(300,))
+
+
+def test_what_stands_beside_the_charts_comes_with_every_second_picture_and_the_last(tmp_path):
+    async def play(run, tab, here):
+        came = []
+        for _ in range(20):
+            seen = tab.snapshots
+            await tab.until("another picture", lambda before=seen: tab.snapshots > before)
+            if tab.snapshots == seen + 1:
+                came.append(tab.is_whole)
+            else:
+                came.append(None)
+        pairs = [pair for pair in pairwise(came) if None not in pair]
+        assert pairs
+        assert all(one != other for one, other in pairs)
+        await asyncio.to_thread(run.ask, "pause")
+        await tab.phase("paused")
+        await whole(tab, run, 1)
+        assert tab.snapshot["tables"].keys() >= {"position", "overview", "loop"}
+
+    follow(play, tmp_path, pace=1.0)
 
 
 def test_who_waits_for_whom_and_what_can_be_chosen_is_told(tmp_path):

@@ -50,23 +50,26 @@ class Viewer:
         self.overlay: RunSession | None = None
         self._followed: RunSession | None = None
         self._listed: tuple[float, Message] = -math.inf, {}
-        self._made: dict[tuple[object, ...], bytes] = {}
+        self._made: dict[tuple[tuple[object, ...], bool], bytes] = {}
 
     async def wait_for_update(self) -> None:
         """Waits until what there is to show may have changed."""
         await self._updated.wait()
 
-    def snapshot(self, viewport: Viewport) -> tuple[tuple[object, ...], bytes] | None:
-        """Returns what is shown in a viewport, made once for all pages that ask, and what tells it from others."""
+    def snapshot(self, viewport: Viewport, beside: bool) -> tuple[tuple[object, ...], bytes] | None:
+        """Returns what is shown in a viewport, made once for all pages that ask, and what tells it from others.
+
+        ``beside`` asks for what stands beside the charts over time, too; both with and without are told as the same.
+        """
         if (session := self.session) is None:
             return None
         key = session.history, session.history.version, self.overlay, viewport
-        if key not in self._made:
+        if (key, beside) not in self._made:
             overlay = self.overlay and self.overlay.history
-            others = [(known, data) for known, data in self._made.items() if known[:3] == key[:3]]
+            others = [(made, data) for made, data in self._made.items() if made[0][:3] == key[:3]]
             self._made = dict(others[-_MOST_MADE:])
-            self._made[key] = snapshot(session.history, viewport, session.changes, overlay)
-        return key, self._made[key]
+            self._made[key, beside] = snapshot(session.history, viewport, session.changes, overlay, beside)
+        return key, self._made[key, beside]
 
     def _notify_pages(self) -> None:
         turned, self._updated = self._updated, asyncio.Event()

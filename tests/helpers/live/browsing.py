@@ -80,7 +80,7 @@ class Tab:
 
     Attributes:
         state, events: as told last; None before.
-        snapshot: the last one, decoded; None before.
+        snapshot: the last one, decoded; None before. ``is_whole``: with what stands beside the charts.
         snapshots: how many have come.
         closed: (code, reason) once the server has closed.
     """
@@ -90,7 +90,7 @@ class Tab:
         self.state: Any = None
         self.events: Any = None
         self.snapshot: Any = None
-        self.snapshots = 0
+        self.snapshots, self.is_whole = 0, False
         self.closed: tuple[int | None, str] | None = None
         self._answers: dict[int, dict[str, Any]] = {}
         self._asked = 0
@@ -100,7 +100,7 @@ class Tab:
         reason = ""
         async for message in self.socket:
             if message.type is aiohttp.WSMsgType.BINARY:
-                self.snapshot, self.snapshots = decode(message.data), self.snapshots + 1
+                self._take(decode(message.data))
                 with suppress(ConnectionError):
                     await self.socket.send_json({"type": "drawn"})
                 continue
@@ -112,6 +112,13 @@ class Tab:
             elif told["type"] == "state":
                 self.state = told
         self.closed = self.socket.close_code, reason
+
+    def _take(self, now: dict[str, Any]) -> None:
+        """Keeps what stood beside the charts before, where this snapshot comes without."""
+        self.is_whole = now["beside"]
+        if not self.is_whole:
+            now = {**self.snapshot, **now, "tables": {**self.snapshot["tables"], **now["tables"]}}
+        self.snapshot, self.snapshots = now, self.snapshots + 1
 
     async def until(self, what: str, look: Callable[[], Any]) -> Any:
         """The first true answer of ``look``."""
@@ -133,7 +140,7 @@ class Tab:
         seen, span_s, end_s = self.snapshots, what.get("span_s"), what.get("end_s")
 
         def shows() -> bool:
-            if self.snapshots == seen:
+            if self.snapshots == seen or not self.is_whole:
                 return False
             from_s, to_s = self.snapshot["from_s"], self.snapshot["to_s"]
             return (span_s is None or abs(to_s - from_s - span_s) < 1e-9) and (

@@ -51,7 +51,7 @@ async def whole(tab, run, ticks, **watch):
 
     def is_whole():
         tables, from_start = tab.snapshot["tables"], "span_s" in watch or tab.snapshot["from_s"] == 0.0
-        return (from_start and tables.keys() >= begins.keys()) and all(
+        return (tab.is_whole and from_start and tables.keys() >= begins.keys()) and all(
             np.isfinite(tables[name]["values"][column][0]) for name, column in begins.items()
         )
 

@@ -33,14 +33,18 @@ class Viewport:
 
 
 def snapshot(
-    history: History, viewport: Viewport, changes: Changes | None = None, overlay: History | None = None
+    history: History,
+    viewport: Viewport,
+    changes: Changes | None = None,
+    overlay: History | None = None,
+    beside: bool = True,
 ) -> bytes:
     """Returns everything a page shows as bytes, packed by :func:`haploop.view.draw.messages.encode`.
 
     Tables over time are position, force and energy; each row by row where the page has room for it, else as an envelope
-    whose rows are the two extremes of consecutive buckets, rising or falling as they do. Then comes an overview of the
-    whole run, and what the page's panel asks for, to which ``changes`` belong. Position and total force of
-    ``overlay``, another run, come beside. A table without data is left out.
+    whose rows are the two extremes of consecutive buckets, rising or falling as they do. Position and total force of
+    ``overlay``, another run, come with them. Where ``beside`` is asked for, there is an overview of the whole run, too,
+    and what the page's panel asks for, to which ``changes`` belong. A table without data is left out.
     """
     rate = history.time.control_rate
     from_tick, to_tick = _window(history, viewport)
@@ -50,12 +54,13 @@ def snapshot(
     more: dict[str, Any] = {}
     if first < end:
         interval = Interval(first, end, rate, viewport.points)
-        tables = [*over_time(history, interval), overview(history)]
+        tables = over_time(history, interval)
         tables += laid_over(overlay, from_tick / rate, to_tick / rate, viewport.points) if overlay else []
         tables += [sound(history)] if viewport.sound else []
-        of_panel, more = PANELS[viewport.panel](Look(history, first, end, interval, changes))
-        tables += of_panel
-    return encode(from_tick / rate, to_tick / rate, [table for table in tables if table], **more)
+        if beside:
+            of_panel, more = PANELS[viewport.panel](Look(history, first, end, interval, changes))
+            tables += [overview(history), *of_panel]
+    return encode(from_tick / rate, to_tick / rate, [table for table in tables if table], beside=beside, **more)
 
 
 def _window(history: History, viewport: Viewport) -> tuple[int, int]:

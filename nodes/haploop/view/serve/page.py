@@ -2,6 +2,7 @@
 
 At most four snapshots are on their way to a page that has not said yet that it drew them: a slow or hidden one costs
 nothing, and one whose answers take as long as four pictures, as beside a run that wants every core, still gets each.
+What stands beside the charts over time comes with every second one, and with the last: nobody reads it more often.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ class Page:
         self._sent_state: tuple[object, ...] | None = ()
         self._sent_events: tuple[object, ...] | None = ()
         self._sent_snapshot: tuple[object, ...] = ()
+        self._sent_beside = False
         self._undrawn = 0
         self._sent_listing: Message = {}
 
@@ -75,7 +77,7 @@ class Page:
                 await self._send_snapshot()
             return
         if isinstance(message, Viewport):
-            self._viewport = message
+            self._viewport, self._sent_beside = message, False
             return
         try:
             ok, text = True, await self._carry_out(message)
@@ -131,8 +133,10 @@ class Page:
     async def _send_snapshot(self) -> None:
         if self._undrawn >= _MOST_UNDRAWN:
             return
-        if (made := self._viewer.snapshot(self._viewport)) and made[0] != self._sent_snapshot:
-            self._sent_snapshot, self._undrawn = made[0], self._undrawn + 1
+        beside = not self._sent_beside
+        made = self._viewer.snapshot(self._viewport, beside)
+        if made and (made[0] != self._sent_snapshot or beside):
+            self._sent_snapshot, self._sent_beside, self._undrawn = made[0], beside, self._undrawn + 1
             await self._socket.send_bytes(made[1])
 
     async def _send(self, message: Message) -> None:

@@ -139,10 +139,12 @@ class LodSeries:
 
     def _pick(self, values: np.ndarray, names: Sequence[str], into: np.ndarray, group: int = 0) -> None:
         """Copies columns by name, reduced to the extremes of every ``group`` values unless it is 0."""
-        known = [row for row, name in enumerate(names) if name in self._columns]
-        if known:
-            chosen = values[[self._columns[names[row]] for row in known]]
-            into[known] = extremes(chosen, group) if group else chosen
+        known = [(row, self._columns[name]) for row, name in enumerate(names) if name in self._columns]
+        if group and known:
+            values = extremes(values[[place for _, place in known]], group)
+            known = [(row, place) for place, (row, _) in enumerate(known)]
+        for row, place in known:
+            into[row] = values[place]
 
     def bucket_from(self, from_tick: int, bucket_ticks: int) -> int:
         """Returns the ticks of a bucket for :meth:`envelope`: ``bucket_ticks``, or more where the past is coarser."""

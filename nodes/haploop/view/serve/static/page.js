@@ -26,6 +26,7 @@ let state = { phase: "waiting", nodes: [] };
 let connected = false;
 let marks = [];
 let snapshot = null;
+let whole = {};
 let drawn = 0;
 const waiting = [];
 
@@ -74,6 +75,7 @@ function onState(now) {
 }
 
 function newRun() {
+  whole = {};
   viewport.live();
   charts.refit();
   swapForm.forget();
@@ -116,6 +118,8 @@ function onSnapshot(buffer) {
 
 function draw() {
   snapshot = decode(waiting.shift());
+  if (snapshot.beside === false) snapshot = { ...whole, ...snapshot, tables: { ...whole.tables, ...snapshot.tables } };
+  else whole = snapshot;
   stream.send({ type: "drawn" }); // the next one is made meanwhile
   if (waiting.length) requestAnimationFrame(draw);
   drawn += 1;

@@ -40,7 +40,7 @@ export class Scrubber {
     const across = (t) => ((t - first) / (last - first)) * width;
     ctx.fillStyle = colour("grid");
     ctx.fillRect(across(from), 0, Math.max(2 * ratio, across(to) - across(from)), height);
-    if (overview) this.line(ctx, overview, across, height);
+    if (overview) this.band(ctx, overview, across, height);
     ctx.fillStyle = colour("mark");
     for (const { t_s, changes } of marks) if (changes) ctx.fillRect(Math.round(across(t_s)), 0, ratio, height);
     if (document.activeElement !== this.input) this.input.value = String(Math.round((STEPS * (Math.min(to, last) - first)) / (last - first)));
@@ -48,15 +48,25 @@ export class Scrubber {
     put(byId("scrub-ends"), `${first.toFixed(1)}–${last.toFixed(1)} s`);
   }
 
-  line(ctx, { t0_s: t0, dt_s: dt, columns: [{ values }] }, across, height) {
+  /** The band between the extremes of each stretch, which come in pairs: a swing too fast for the strip has no zigzags. */
+  band(ctx, { t0_s: t0, dt_s: dt, columns: [{ values }] }, across, height) {
     const [low, high] = extent([values]);
-    ctx.strokeStyle = colour("grey");
+    const down = (value) => height * (0.1 + 0.8 * (high > low ? (high - value) / (high - low) : 0.5));
+    const [upper, lower] = [[], []];
+    for (let i = 0; i + 1 < values.length; i += 2) {
+      const [one, other] = [values[i], values[i + 1]];
+      if (one + other - (one + other) !== 0) continue;
+      const x = across(t0 + (i + 0.5) * dt);
+      upper.push([x, down(Math.max(one, other))]);
+      lower.push([x, down(Math.min(one, other))]);
+    }
+    ctx.strokeStyle = ctx.fillStyle = colour("grey");
     ctx.lineWidth = devicePixelRatio;
+    ctx.lineJoin = "round";
     ctx.beginPath();
-    values.forEach((value, i) => {
-      if (value - value !== 0) return;
-      ctx.lineTo(across(t0 + i * dt), height * (0.1 + 0.8 * (high > low ? (high - value) / (high - low) : 0.5)));
-    });
+    for (const [x, y] of [...upper, ...lower.reverse()]) ctx.lineTo(x, y);
+    ctx.closePath();
+    ctx.fill();
     ctx.stroke();
   }
 }
