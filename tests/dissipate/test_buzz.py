@@ -52,14 +52,44 @@ def test_a_buzz_is_told_at_its_frequency_on_a_hands_motion_noise_and_counts(
     assert buzz is not None
     assert abs(buzz.frequency_Hz - frequency_Hz) < 0.5 * buzz.within_Hz
     assert buzz.width_m == pytest.approx(4e-4, rel=0.15)
-    assert (buzz.from_s, buzz.to_s) == (0.0, pytest.approx(S[-1], abs=0.125))
+    assert buzz.stretches == ((0.0, pytest.approx(S[-1], abs=0.125)),)
 
 
 @pytest.mark.parametrize("begins_s", [1.0, 1.3, 2.0, 2.4])
 def test_a_buzz_begins_when_it_does_within_half_a_second(begins_s: float) -> None:
     buzz = finder(counted(swing(31.0, 2.6e-4) * (begins_s < S) - 2e-3 * np.minimum(S, 1.0))).buzz()
     assert buzz is not None
-    assert buzz.from_s == pytest.approx(begins_s, abs=0.5)
+    assert buzz.stretches[0][0] == pytest.approx(begins_s, abs=0.5)
+
+
+def test_a_buzz_that_pauses_is_told_with_all_its_stretches_also_those_that_do_not_last_alone(tmp_path: Path) -> None:
+    long = np.arange(9000.0) * 1e-3
+    on = (long < 2.0) | ((long >= 3.5) & (long < 4.2)) | (long >= 6.0)
+    x_m = 2.6e-4 * np.sin(2.0 * np.pi * 31.0 * long) * on - 1e-3 * long
+    buzz = finder(counted(x_m)).buzz()
+    assert buzz is not None
+    assert buzz.stretches == tuple(pytest.approx(span, abs=0.3) for span in ((0.0, 2.0), (3.5, 4.2), (6.0, 9.0)))
+    said = shown(make_report(outcome(write(tmp_path / "pauses.csv", {"t": long, "x": counted(x_m)}))), 200)
+    assert "31.0 Hz (give or take 1 Hz)" in said
+    assert "3 times between about 0.0 s and 9.0 s, " in said
+    assert "run haploop advise FILE" in said
+
+
+def test_a_gap_in_a_recording_does_not_end_its_buzz() -> None:
+    x_m, found = counted(swing(31.0, 2.6e-4)), BuzzFinder(1e-3)
+    for first, end in ((0, 2000), (2013, 4000)):
+        t, x = S[first:end], x_m[first:end]
+        found.add(Samples(t, x, None, None, x, None, True))
+    buzz = found.buzz()
+    assert buzz is not None
+    assert buzz.stretches == ((0.0, pytest.approx(S[-1], abs=0.125)),)
+
+
+def test_a_buzz_whose_frequency_moves_is_told_from_its_least_to_its_greatest(tmp_path: Path) -> None:
+    x_m = 5e-4 * np.sin(2.0 * np.pi * (26.0 * S + 2.0 * S**2))
+    said = shown(make_report(outcome(write(tmp_path / "sweep.csv", {"t": S, "x": x_m}))))
+    assert "it swings at 27 to 41 Hz, 1.0" in said
+    assert "give or take" not in said
 
 
 def test_the_frequency_is_that_of_the_times_where_they_jitter() -> None:
@@ -141,10 +171,10 @@ def test_the_buzz_is_the_first_thing_said_also_without_an_element(recording: Pat
 
 def test_a_swing_as_slow_as_a_hands_is_told_as_what_it_is(tmp_path: Path) -> None:
     said = shown(
-        make_report(outcome(write(tmp_path / "slow.csv", {"t": S, "x": swing(8.0, 1e-3)}), dampings=["2"])), 200
+        make_report(outcome(write(tmp_path / "slow.csv", {"t": S, "x": swing(8.0, 1e-3)}), dampings=["2"])), 400
     )
     assert said.startswith("No buzz was seen")
-    assert "It swings at 8 Hz, which a hand can, too." in said
+    assert "It swings at 8 Hz, 2.00 mm peak to peak at most, which a hand can, too." in said
 
 
 def test_the_advised_low_pass_leaves_the_swing_of_the_motion_in(recording: Path, tmp_path: Path) -> None:

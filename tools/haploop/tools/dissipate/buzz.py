@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -33,19 +33,33 @@ Word = Literal["buzzes", "none seen", "cannot say"]
 
 @dataclass(frozen=True)
 class Buzz:
-    """The longest stretch of a recording that buzzes.
+    """The buzz of a recording, in one stretch or more.
 
     Attributes:
         frequency_Hz, within_Hz: median of the windows', and half of what a window resolves.
-        from_s, to_s: half a second at most too early or late.
+        least_Hz, most_Hz: of the windows.
+        stretches: (from, to) of each, half a second at most too early or late, s.
         width_m: of the widest window, peak to peak.
     """
 
     frequency_Hz: float
     within_Hz: float
+    least_Hz: float
+    most_Hz: float
+    stretches: tuple[tuple[float, float], ...]
+    width_m: float
+
+    @property
+    def lasts_s(self) -> float:
+        return sum(to_s - from_s for from_s, to_s in self.stretches)
+
+
+class _Window(NamedTuple):
+    """A window that swings."""
+
     from_s: float
     to_s: float
-    width_m: float
+    line: Line
 
 
 class BuzzFinder:
@@ -63,7 +77,7 @@ class BuzzFinder:
         self._begins_s = self.longest_s = 0.0
         self.slow: Line | None = None
         # Windows that swing, in stretches without one that does not or has another frequency.
-        self._stretches: list[list[tuple[float, float, Line]]] = [[]]
+        self._stretches: list[list[_Window]] = [[]]
 
     def add(self, piece: Samples) -> None:
         """Takes a piece; its times tell a rate that its period is only about."""
@@ -85,31 +99,51 @@ class BuzzFinder:
         from_s, to_s = float(t_s[0]), float(t_s[-1])
         line = swing(x_m, (len(t_s) - 1) / (to_s - from_s))
         last = self._stretches[-1]
-        if last and not (line and abs(line.frequency_Hz - last[-1][2].frequency_Hz) < _RESOLVED_HZ):
+        if last and not (line and abs(line.frequency_Hz - last[-1].line.frequency_Hz) < _RESOLVED_HZ):
             last = []
             self._stretches.append(last)
         if line:
             # What begins within a window begins in its middle, give or take half of it.
             begins_s = from_s if from_s == self._begins_s else (from_s + to_s) / 2.0
-            last.append((begins_s, to_s, line))
+            last.append(_Window(begins_s, to_s, line))
 
     def buzz(self) -> Buzz | None:
-        """Returns the longest buzz; None where there was none, or nothing can be said."""
-        found = [buzz for stretch in self._stretches if (buzz := self._buzz(stretch))]
-        return max(found, key=lambda buzz: buzz.to_s - buzz.from_s, default=None)
+        """Returns the buzz; None where there was none, or nothing can be said.
 
-    def _buzz(self, stretch: list[tuple[float, float, Line]]) -> Buzz | None:
-        widths = [line.width for *_, line in stretch]
-        needed = round(4 * (LASTS_S - _WINDOW_S) / _WINDOW_S)
-        lasting = [i for i in range(len(widths) - needed) if widths[i + needed] >= _KEPT * max(widths[i : i + needed])]
+        Where one stretch lasts, shorter ones at its frequencies count, too, as long as they are as wide.
+        """
+        lasting = [kept for stretch in self._stretches if (kept := self._lasting(stretch))]
         if not lasting:
             return None
-        kept = stretch[lasting[0] : lasting[-1] + needed + 1]
-        frequency_Hz = float(np.median([line.frequency_Hz for *_, line in kept]))
-        width_m = max(line.width for *_, line in kept)
-        if self.slow and _is_overtone(frequency_Hz, width_m, self.slow):
-            return None
-        return Buzz(frequency_Hz, 0.5 * _RESOLVED_HZ, kept[0][0], kept[-1][1], width_m)
+        kept = [window for stretch in lasting for window in stretch]
+        swings_Hz = [window.line.frequency_Hz for window in kept]
+        least_Hz, most_Hz, width_m = min(swings_Hz), max(swings_Hz), max(window.line.width for window in kept)
+
+        def is_alike(window: _Window) -> bool:
+            is_near = least_Hz - _RESOLVED_HZ < window.line.frequency_Hz < most_Hz + _RESOLVED_HZ
+            return is_near and window.line.width >= _KEPT * width_m
+
+        shorter = [window for stretch in self._stretches for window in stretch if is_alike(window)]
+        return Buzz(
+            float(np.median(swings_Hz)),
+            0.5 * _RESOLVED_HZ,
+            least_Hz,
+            most_Hz,
+            _joined([(window.from_s, window.to_s) for window in kept + shorter]),
+            width_m,
+        )
+
+    def _lasting(self, stretch: list[_Window]) -> list[_Window]:
+        """Returns the part of a stretch that lasts without decaying; none where it is an overtone of the motion."""
+        widths = [window.line.width for window in stretch]
+        needed = round(4 * (LASTS_S - _WINDOW_S) / _WINDOW_S)
+        lasting = [i for i in range(len(widths) - needed) if widths[i + needed] >= _KEPT * max(widths[i : i + needed])]
+        kept = stretch[lasting[0] : lasting[-1] + needed + 1] if lasting else []
+        if kept and self.slow:
+            frequency_Hz = float(np.median([window.line.frequency_Hz for window in kept]))
+            if _is_overtone(frequency_Hz, max(window.line.width for window in kept), self.slow):
+                return []
+        return kept
 
     def word(self) -> Word:
         """Returns whether the recording buzzes, as far as it can be said."""
@@ -122,6 +156,17 @@ def _is_overtone(frequency_Hz: float, width_m: float, of: Line, apart_Hz: float 
     order = frequency_Hz / of.frequency_Hz
     is_multiple = abs(order - round(order)) * of.frequency_Hz < apart_Hz or of.frequency_Hz < _CLOSE_HZ
     return is_multiple and width_m < _OVERTONE / order**2 * of.width
+
+
+def _joined(spans: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    """Joins spans of time that lie no further apart than half a window, which tells no shorter pause."""
+    joined: list[tuple[float, float]] = []
+    for from_s, to_s in sorted(spans):
+        if joined and from_s <= joined[-1][1] + 0.5 * _WINDOW_S:
+            joined[-1] = joined[-1][0], max(joined[-1][1], to_s)
+        else:
+            joined.append((from_s, to_s))
+    return tuple(joined)
 
 
 def swing(x_m: Floats, rate_Hz: float) -> Line | None:

@@ -16,6 +16,7 @@ from haploop.tools.dissipate.force_book import Passivity
 from haploop.tools.dissipate.samples import Floats, LogRecording
 from haploop.tools.dissipate.text_recording import TextRecording
 from haploop.tools.render.units import amount
+from haploop.view.look.spectrum import Line
 from haploop.view.store.lod_level import extremes
 
 # Both have a name, the control period and the delay of the forces in s, ``between``: what the motion between samples is
@@ -145,7 +146,7 @@ class Outcome:
         force: that of a recorded force; None where there was none.
         noise_m: noise of the recorded positions; None where rates were recorded beside them.
         buzz_word, buzz: whether the recording buzzes, and the buzz.
-        main_Hz: frequency of the buzz, or of a slower motion that has one; None of others.
+        slow: the widest line of a slower motion; None of one without.
     """
 
     recording: Recording
@@ -156,7 +157,13 @@ class Outcome:
     noise_m: float | None
     buzz_word: Word
     buzz: Buzz | None
-    main_Hz: float | None
+    slow: Line | None
+
+    @property
+    def main_Hz(self) -> float | None:
+        """Returns the frequency of the buzz, or of a slower motion that has one; None of others."""
+        line = self.buzz or self.slow
+        return line.frequency_Hz if line else None
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -230,10 +237,7 @@ def make_outcome(
         # The sign of a force in a log is known.
         is_signed = of.passivity == "other sign" and isinstance(recording, LogRecording)
         force = ForceOutcome(own, of.naive_J, "generated" if is_signed else of.passivity, of.excess_J)
-    buzz = found.buzz()
-    line = buzz or found.slow
-    main_Hz = line.frequency_Hz if line else None
-    return Outcome(recording, elements, trace, scene, force, noise_m, found.word(), buzz, main_Hz)
+    return Outcome(recording, elements, trace, scene, force, noise_m, found.word(), found.buzz(), found.slow)
 
 
 def _label(table: ElementTable, declared: Mapping[str, tuple[Quantity, object]]) -> str:

@@ -9,7 +9,7 @@ from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.dissipate.force_book import Passivity
 from haploop.tools.dissipate.outcome import ElementOutcome, ForceOutcome, Outcome
-from haploop.tools.dissipate.swing_sentences import buzz_sentence, filtered_out, low_pass
+from haploop.tools.dissipate.swing_sentences import NEXT, buzz_sentence, filtered_out, low_pass
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
 
@@ -78,7 +78,8 @@ def make_report(outcome: Outcome) -> RenderableType:
         Text(sentence, style="bold yellow") for sentence in [*outcome.recording.notes.remarks, *filtered_out(outcome)]
     ]
     buzz = Text(buzz_sentence(outcome), style="bold" if outcome.buzz else "")
-    notes = (Text(sentence, style="dim") for sentence in note_sentences(outcome))
+    said = [*note_sentences(outcome), *([NEXT] if outcome.buzz else [])]
+    notes = (Text(sentence, style="dim") for sentence in said)
     return Group(*doubts, buzz, head, *([table] if rows(outcome) else []), *notes)
 
 

@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from haploop.tools.dissipate.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, Word
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.render.units import amount
 
 _BUZZ: dict[Word, str] = {
-    "buzzes": (
-        "The recording buzzes: it swings at {frequency:.1f} Hz (give or take {within:g} Hz), {width} peak to peak at "
-        "most, from about {from_s:.1f} s to {to_s:.1f} s."
-    ),
+    "buzzes": "The recording buzzes: it swings at {frequency}, {width} peak to peak at most, {when}.",
     "none seen": (
         "No buzz was seen: no swing at one frequency above {above:g} Hz lasts {lasts:g} s and is wide enough to be "
-        "felt."
+        "felt. Swings at several frequencies at once are not looked for."
     ),
     "cannot say": (
         "Whether the recording buzzes cannot be said: that takes {lasts:g} s without a gap, and {rate:g} samples a "
         "second."
     ),
 }
-_SLOWER = " It swings at {main:.3g} Hz, which a hand can, too."
+_ONE_HZ, _MOVING_HZ = "{0:.1f} Hz (give or take {1:g} Hz)", "{0:.0f} to {1:.0f} Hz"
+_ONCE, _AGAIN = "from about {0:.1f} s to {1:.1f} s", "{0} times between about {1:.1f} s and {2:.1f} s, {3:.1f} s in all"
+_SLOWER = " It swings at {main:.3g} Hz, {width} peak to peak at most, which a hand can, too."
+NEXT = (
+    "Which wall and which element suit the device: describe it in a file (haploop scenes premium15 prints one to start "
+    "from), and run haploop advise FILE."
+)
 _LOW_PASS = (
     "Low-pass the estimates, as by --set acceleration.cutoff={acceleration:.0f} or --set "
     "velocity.cutoff={velocity:.0f}, until the energy no longer depends on it."
@@ -38,12 +43,20 @@ _FILTERED_OUT = (
 
 
 def buzz_sentence(outcome: Outcome) -> str:
-    """Returns whether the recording buzzes: at which frequency, how wide, since when."""
-    limits = {"above": ABOVE_HZ, "lasts": LASTS_S, "rate": LEAST_RATE_HZ}
+    """Returns whether the recording buzzes: at which frequency, how wide, when."""
+    limits: dict[str, Any] = {"above": ABOVE_HZ, "lasts": LASTS_S, "rate": LEAST_RATE_HZ}
     if buzz := outcome.buzz:
-        limits |= {"frequency": buzz.frequency_Hz, "within": buzz.within_Hz, "from_s": buzz.from_s, "to_s": buzz.to_s}
-    words = _BUZZ[outcome.buzz_word].format(width=amount(outcome.buzz and outcome.buzz.width_m, "m"), **limits)
-    return words + ("" if outcome.buzz or not outcome.main_Hz else _SLOWER.format(main=outcome.main_Hz))
+        moves = buzz.most_Hz - buzz.least_Hz > 2.0 * buzz.within_Hz
+        of_Hz = (buzz.least_Hz, buzz.most_Hz) if moves else (buzz.frequency_Hz, buzz.within_Hz)
+        limits["frequency"] = (_MOVING_HZ if moves else _ONE_HZ).format(*of_Hz)
+        limits["width"] = amount(buzz.width_m, "m")
+        from_s, to_s = buzz.stretches[0][0], buzz.stretches[-1][1]
+        times = len(buzz.stretches)
+        limits["when"] = _ONCE.format(from_s, to_s) if times == 1 else _AGAIN.format(times, from_s, to_s, buzz.lasts_s)
+    words = _BUZZ[outcome.buzz_word].format(**limits)
+    if outcome.buzz or not outcome.slow:
+        return words
+    return words + _SLOWER.format(main=outcome.slow.frequency_Hz, width=amount(outcome.slow.width, "m"))
 
 
 def filtered_out(outcome: Outcome) -> list[str]:
