@@ -1,23 +1,27 @@
 """`haploop advise`: what the first line says, formulas beside it, and that an interrupted advice goes on."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
+from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.file import load
 from haploop.launch.stability.judge import judge_scene
+from haploop.logger.log.recording import MemoryLog
 from haploop.protocol.scene.paths import value_at
-from haploop.tools.advise.advice import advised_scene, is_ideal
+from haploop.protocol.scene.scene import Scene
+from haploop.tools.advise.advice import advised_scene, ending_with, is_ideal
 from haploop.tools.advise.families import DAMPING
 from haploop.tools.advise.known import PUBLISHED, formulas
 from haploop.tools.advise.report import assumes
 from haploop.tools.advise.search import Found
 from haploop.tools.advise.subject import Assumed, make_subject
-from haploop.tools.advise.walls.cases import make_loop
+from haploop.tools.advise.walls.cases import Case, make_loop
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.withstand import Best, rounded_down
 from haploop.tools.cli.app import app
@@ -86,6 +90,39 @@ def test_an_advice_says_first_that_it_is_an_upper_bound_goes_on_when_stopped_and
     again = json.loads(CliRunner().invoke(app, asked).stdout.splitlines()[-1])
     assert 0 < again.pop("runs") < found.pop("runs")
     assert again == found
+
+
+_STAGE = """
+device = { mass = 0.085, damping = 0.12 }
+friction.kinetic = 0.15
+encoder.resolution = "0.2 m / 4096"
+actuator.saturation = 18
+clock.round_trip_delay = "1 ms"
+"""
+_CORNER = {"device mass": 0.8, "hand mass": 1.2, "hand damping": 0.8, "hand stiffness": 1.2, "friction": 0.8}
+_CORNER |= {"device damping": 1.2, "actuator force": 0.8, "clock.round_trip_delay": 0.5}
+
+
+@pytest.mark.slow
+def test_a_scene_shows_what_broke_a_wall_that_pushes_find_steady_and_none_shows_what_no_hand_feels(tmp_path):
+    (tmp_path / "stage.toml").write_text(_STAGE)
+    subject = make_subject(str(tmp_path / "stage.toml"))
+    loop = make_loop(subject.scene, subject.has_task)
+    case = Case(2.0, tuple(_CORNER.items())).scene(loop)
+
+    def ends(stiffness_N_m: float) -> Scene | None:
+        damping = DAMPING.elements((4.9,))
+        wall = replace(case.wall, stiffness=stiffness_N_m)
+        return ending_with(replace(case, wall=wall, dissipation=damping), loop, 1.75)
+
+    assert not ends(100.0)
+    shown = ends(2558.06)
+    assert shown
+    judged = replace(shown, run=replace(shown.run, verdict="pushed"))
+    assert judge_scene(judged, KINDS).word == "steady"
+    window = run_in_process(shown, KINDS, memory=MemoryLog())["window"]
+    assert (shown.duration, window["from_s"]) == (1.75, 1.25)
+    assert window["force_swing_N"] == pytest.approx(0.603, abs=1e-3)
 
 
 def test_a_directory_of_something_else_is_refused(tmp_path):

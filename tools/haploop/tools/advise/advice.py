@@ -13,11 +13,13 @@ from haploop.tools.advise.changes import assumed_otherwise, changed_limits, chan
 from haploop.tools.advise.known import PUBLISHED, Formula, Published, formulas
 from haploop.tools.advise.search import Found, search
 from haploop.tools.advise.subject import Assumed, Subject
-from haploop.tools.advise.walls.cases import Case, every_case, make_loop, task_words
+from haploop.tools.advise.walls.cases import Case, every_case, make_loop, slowness, task_words
 from haploop.tools.advise.walls.corners import ASSUMED, as_built, is_number, quantity, ranges
+from haploop.tools.advise.walls.felt import buzz, felt_force_N
 from haploop.tools.advise.walls.limit import Limit
+from haploop.tools.advise.walls.loops import LoneLoop
 from haploop.tools.advise.walls.store import Failure, Tried
-from haploop.tools.advise.walls.trial import Trial
+from haploop.tools.advise.walls.trial import STRETCH_S, Trial
 from haploop.tools.linear.linearity import installed_kinds
 from haploop.tools.render.units import spring
 
@@ -77,7 +79,8 @@ class Advice:
         assumed: each assumed number with the limit at half and at double of it.
         own: of a scene with a wall: its stiffness, and what it does with its own elements; None where it bears all.
         scene: that shows the advised wall; None where nothing is safe.
-        breaks: that shows the case which breaks first, on the softest wall on which its verdict is not steady.
+        breaks: that shows the case which breaks first, on the softest wall on which its verdict is not steady; where
+            there is none, on the wall that broke, up to the end of the stretch in which that was seen.
     """
 
     name: str
@@ -198,12 +201,27 @@ def _shown(
 def _breaking(subject: Subject, loop: Scene, found: Found) -> Scene | None:
     """Returns the case that breaks first on the softest wall, from that which it broke on, that is not steady there.
 
-    What broke by its force alone, or with friction as projected in arrays, a run may yet call steady.
+    Where a run calls all of these steady, the scene is of the wall that broke and ends with the stretch in which it
+    was seen to; None where no hand would feel what a run does there.
     """
     if not found.breaks or not (case := found.breaks[1].tried):
         return None
-    shown = (_shown(subject, loop, found, found.breaks[0] * share, case) for share in _STIFFER)
-    return next((scene for scene in shown if scene and judge_scene(scene, installed_kinds()).word in _UNSTEADY), None)
+    judged = replace(subject, scene=replace(subject.scene, run=replace(subject.scene.run, verdict="pushed")))
+    shown = [_shown(judged, loop, found, found.breaks[0] * share, case) for share in _STIFFER]
+    kinds = installed_kinds()
+    unsteady = (scene for scene in shown if scene and judge_scene(scene, kinds).word in _UNSTEADY)
+    return next(unsteady, None) or (ending_with(shown[0], loop, found.breaks[1].at_s) if shown[0] else None)
+
+
+def ending_with(scene: Scene, loop: Scene, at_s: float) -> Scene | None:
+    """Returns a scene that ends with the stretch up to this time and is not pushed; None if it is not felt there."""
+    lasts_s, rate = STRETCH_S * slowness(loop), loop.clock.control_rate
+    lone, ticks = LoneLoop(scene, installed_kinds()), round(lasts_s * rate)
+    lone.go_on(round(at_s * rate) - ticks)
+    seen, felt_N = lone.go_on(ticks), felt_force_N(loop)
+    if not seen.gone[0] and buzz(seen.x, seen.measured, seen.command, rate, felt_N).times_felt[0] < 1.0:
+        return None
+    return replace(scene, duration=at_s, run=replace(scene.run, verdict="window"))
 
 
 def advice_data(told: Advice, sentences: list[str]) -> AdviceData:

@@ -19,7 +19,8 @@ from haploop.tools.render.units import amount, fixed
 _NO_WALL = "none: no wall bears every case"
 _NOTHING_BREAKS = "nothing that was tried"
 # Trials hold force and motion against what is felt, with friction projected on the steps; a run is judged otherwise.
-_SHOWN_BY_NONE = "; no scene shows it, since a run of this case is judged steady on a wall twice as stiff, too"
+_SHOWN_AT_END = "; advice_breaks.toml ends with it: its swing and its force there are felt, whatever its verdict"
+_SHOWN_BY_NONE = "; no scene shows it: with friction solved exactly, as in a run, no hand would feel it"
 # A changed limit tells something where it differs by more than how closely it is known.
 _TELLS = 1.2
 _NO_CHANGE, _NO_LOSS = "no single change that was tried gains a fifth", "no single change that was tried costs a sixth"
@@ -64,7 +65,8 @@ def answer(told: Advice) -> list[tuple[str, str]]:
         lines.append(("no element", _ALONE.format(format_stiffness(found.alone_N_m)) if found.alone_N_m else _NO_WALL))
     broken = found.breaks
     breaks = f"{format_stiffness(broken[0])}: {describe(broken[1])}" if broken else _NOTHING_BREAKS
-    breaks += _SHOWN_BY_NONE if broken and not told.breaks else ""
+    if broken and not (told.breaks and told.breaks.run.verdict == "pushed"):
+        breaks += _SHOWN_AT_END if told.breaks else _SHOWN_BY_NONE
     lines.append(("breaks first", breaks))
     gains = [f"{row.words}: {fixed(row.factor, 2)} times" for row in told.changed if row.factor >= _TELLS]
     lines.append(("gains most", "; ".join(gains[:3]) or _NO_CHANGE))
