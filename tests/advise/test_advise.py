@@ -13,7 +13,7 @@ from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.file import load
 from haploop.launch.stability.judge import judge_scene
 from haploop.logger.log.recording import MemoryLog
-from haploop.protocol.scene.paths import value_at
+from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.advice import advised_scene, ending_with, is_ideal
 from haploop.tools.advise.families import DAMPING
@@ -112,8 +112,8 @@ def test_a_scene_shows_what_broke_a_wall_that_pushes_find_steady_and_none_shows_
 
     def ends(stiffness_N_m: float) -> Scene | None:
         damping = DAMPING.elements((4.9,))
-        wall = replace(case.wall, stiffness=stiffness_N_m)
-        return ending_with(replace(case, wall=wall, dissipation=damping), loop, 1.75)
+        scene = replace(with_value(case, "wall.stiffness", stiffness_N_m), dissipation=damping)
+        return ending_with(scene, loop, 1.75)
 
     assert not ends(100.0)
     shown = ends(2558.06)
