@@ -172,4 +172,4 @@ def _answer(outcome: Outcome) -> list[str]:
     sentence = conclusion(outcome)
     words = f"{sentence[:1].upper()}{sentence[1:]}"
     room = {"max_lines": _MOST_ANSWER_LINES - 1, "placeholder": " …"}
-    return [buzz_sentence(outcome), *textwrap.wrap(words, _LINE_LETTERS, **room)]
+    return [*textwrap.wrap(buzz_sentence(outcome), _LINE_LETTERS), *textwrap.wrap(words, _LINE_LETTERS, **room)]
