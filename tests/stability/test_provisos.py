@@ -70,7 +70,7 @@ def test_the_word_for_a_hand_that_moves_is_one_of_some_holds(force, said):
                                                              (5.0, 0.08, False), (1.0, None, False)])  # fmt: skip
 def test_a_force_that_ripples_by_a_tenth_of_the_hold_or_of_a_newton_is_told_beside_the_word(hold_N, ripple_N, is_said):
     for word, why in (("steady", "rest"), ("limit-cycle", "lasts")):
-        said = Finding(word, why, push_N=0.3 * hold_N).entries(ripple_N=ripple_N)["stability"]["provisos"]
+        said = Finding(word, why, push_N=0.3 * hold_N, felt=True).entries(ripple_N=ripple_N)["stability"]["provisos"]
         assert said == ["its force ripples"] * (is_said and word == "steady")
 
 
@@ -89,6 +89,22 @@ def test_a_loop_without_friction_that_noise_moves_by_as_much_as_a_hand_feels_say
 def test_of_a_push_that_friction_withstands_it_is_said_that_nothing_moved():
     finding = found(scene(**pressed(friction={"kinetic": 0.9})))
     assert (finding.word, finding.why, finding.settles_s) == ("steady", "unmoved", None)
+
+
+def test_a_limit_cycle_that_no_hand_feels_is_told_so_beside_the_word_and_in_micrometres():
+    finding = Finding("limit-cycle", "forgets", 1.0, width_m=3.45e-7, frequency_Hz=40.0)
+    assert finding.entries()["stability"]["provisos"] == ["less than a hand feels"]
+    assert "the same swing, 0.345 µm peak to peak" in finding.sentence()
+    assert replace(finding, felt=True, width_m=1e-3).entries()["stability"]["provisos"] == []
+    assert "1 mm peak" in replace(finding, width_m=1e-3).sentence()
+
+
+@pytest.mark.parametrize(
+    ("rate_1_s", "error_1_s", "is_told"), [(-1.25, 0.009, True), (-1.25, 0.5, False), (0.0, 1.0, False)]
+)
+def test_what_no_hand_feels_is_told_to_decay_still_where_it_does_by_three_standard_errors(rate_1_s, error_1_s, is_told):
+    finding = Finding("steady", "unfelt", 1.0, 4.0, rate_1_s, error_1_s, 12.5, 1.9e-5, settles_s=2.4)
+    assert finding.sentence().endswith("feels, and still decaying by 1.25 +- 0.009 1/s." if is_told else "feels.")
 
 
 def test_of_an_unfelt_swing_that_was_there_all_along_no_time_is_told_after_which_it_came(monkeypatch):

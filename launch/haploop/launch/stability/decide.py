@@ -36,9 +36,12 @@ _STILL_N = 1e-9
 # A command whose ripple is more than this share of the push, a tenth of the hold, or this, is told of beside the word;
 # so is noise that moves the device by as much as a hand feels from 25 Hz on, peak to peak.
 _RIPPLES, _RIPPLES_N, _SHAKEN_M = 0.33, 0.1, 10e-6
-HAND_MOVES, NOISE = "the hand's motion", "noise"
+HAND_MOVES, NOISE, UNFELT = "the hand's motion", "noise", "less than a hand feels"
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
 _COUNTS = 10
+
+# A width below this is told in micrometres; what decays by less than this has come to its end.
+_FINE_UM, _DECAYS_1_S = 10.0, 0.05
 
 WHY = {
     "diverged": "The run ended by itself: {detail}.",
@@ -46,14 +49,14 @@ WHY = {
     "rest": "After a push of {push_N:.3g} N it came to rest, to 5 % within {settles_s:.2g} s.",
     "unmoved": "After a push of {push_N:.3g} N, which did not move it, it rested.",
     "unfelt": "After a push of {push_N:.3g} N it came to rest within {settles_s:.2g} s but for "
-    "{width_um:.3g} µm peak to peak, most at {frequency_Hz:.3g} Hz: less than a hand feels.",
+    "{width_um:.3g} µm peak to peak, most at {frequency_Hz:.3g} Hz: less than a hand feels{decaying}.",
     "unfelt throughout": "After a push of {push_N:.3g} N it swung by no more than {width_um:.3g} µm peak to peak, most "
-    "at {frequency_Hz:.3g} Hz: less than a hand feels.",
-    "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width_mm:.3g} mm peak to peak at "
+    "at {frequency_Hz:.3g} Hz: less than a hand feels{decaying}.",
+    "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width} peak to peak at "
     "{frequency_Hz:.3g} Hz.",
-    "lasts": "Swings of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, growing "
+    "lasts": "Swings of {width} peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, growing "
     "or decaying by no more than {most_1_s:.2g} 1/s (two standard errors).",
-    "decays": "Its swing of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz still decays, by {rate_1_s:.3g} +- "
+    "decays": "Its swing of {width} peak to peak at {frequency_Hz:.3g} Hz still decays, by {rate_1_s:.3g} +- "
     "{error_1_s:.2g} 1/s, and nothing in the loop makes small swings other than large ones.",
     "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",
     "leaves the limit": "Its swing grew until the device was beyond its limit.",
@@ -61,12 +64,13 @@ WHY = {
     "rested": "After a push of {push_N:.3g} N it came to rest.",
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
     "rests off the wall": "After a push of {push_N:.3g} N it came to rest off the wall.",
-    "too few": "It still moves, by {width_mm:.3g} mm peak to peak in half of {watched_s:g} s: too slowly to tell what "
+    "too few": "It still moves, by {width} peak to peak in half of {watched_s:g} s: too slowly to tell what "
     "becomes of it; {run} might tell.",
-    "too slow": "Of its swings of {width_mm:.3g} mm peak to peak at {frequency_Hz:.3g} Hz the steadier changes by "
+    "too slow": "Of its swings of {width} peak to peak at {frequency_Hz:.3g} Hz the steadier changes by "
     "{rate_1_s:.2g} +- {error_1_s:.2g} 1/s, too slowly, or too unlike the other, to tell within {watched_s:g} s; "
     "{run} might tell.",
 }
+DECAYING = ", and still decaying by {0:.3g} +- {1:.2g} 1/s"
 # What is said beside that after a blow, and of the loop without its friction.
 AFTER_BLOW = {
     "rests": " It did after blows of {blow_N:.3g} N for 0.05 s, into the wall and off it, too.",
@@ -183,8 +187,9 @@ class Finding:
         return {"verdict": self.word, "verdict_rule": self.sentence(), "stability": numbers}
 
     def _provisos(self, seen_m: float | None, beside: Sequence[str], ripple_N: float | None) -> list[str]:
-        """Returns what has to be said in the same breath as ``steady``."""
+        """Returns what has to be said in the same breath as ``steady``, or as a swing that nobody feels."""
         holds = {
+            UNFELT: self.word == "limit-cycle" and not self.felt,
             "only friction holds it": self.frictionless == "swings on",
             "perhaps only friction holds it": self.frictionless == "undecided",
             "an element's memory still changes": self.memory_drifts,
@@ -192,7 +197,8 @@ class Finding:
             "noise shakes it": NOISE in beside and (seen_m or 0.0) > _SHAKEN_M,
             "its force ripples": (ripple_N or 0.0) > min(_RIPPLES * self.push_N, _RIPPLES_N),
         }
-        return [proviso for proviso, holds_it in holds.items() if holds_it and self.word == "steady"]
+        told = [proviso for proviso, holds_it in holds.items() if holds_it]
+        return told if self.word == "steady" else [proviso for proviso in told if proviso == UNFELT]
 
     def own_share(self, seen_m: float | None) -> float | None:
         """Returns which share of the swing seen in the run the loop keeps up by itself, with a still hand and no noise.
@@ -205,13 +211,19 @@ class Finding:
         own_m = 0.0 if self.why == "decays" else self.width_m
         return min(own_m / seen_m, 1.0) if own_m < _WIDER * seen_m else None
 
+    def _decaying(self) -> str:
+        """Returns whether what is left becomes less yet, beyond three standard errors; "" where it does not."""
+        rate_1_s, error_1_s = self.rate_1_s or 0.0, self.error_1_s or 0.0
+        return DECAYING.format(-rate_1_s, error_1_s) if rate_1_s < -max(3.0 * error_1_s, _DECAYS_1_S) else ""
+
     def sentence(self) -> str:
         """Returns why, with its numbers."""
         numbers = {name: math.nan if value is None else value for name, value in vars(self).items()}
-        sizes = {"width_mm": 1e3 * self.width_m, "width_um": 1e6 * self.width_m}
+        width_um = 1e6 * self.width_m
+        width = f"{1e-3 * width_um:.3g} mm" if width_um >= _FINE_UM else f"{width_um:.3g} µm"
         about_s = float(f"{numbers['needs_s']:.2g}")
         run = f"some {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
-        sentence = WHY[self.why].format(**numbers, **sizes, run=run)
+        sentence = WHY[self.why].format(**numbers, width=width, width_um=width_um, run=run, decaying=self._decaying())
         sentence += AFTER_BLOW[self.blown].format(**numbers) if self.blown else ""
         sentence += AT_HARDEST[self.at_hardest].format(**numbers) if self.at_hardest else ""
         return sentence + (FRICTIONLESS[self.frictionless] if self.frictionless else "")
