@@ -18,7 +18,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.advice import advised_scene, ending_with, is_ideal
 from haploop.tools.advise.families import DAMPING
 from haploop.tools.advise.known import PUBLISHED, formulas
-from haploop.tools.advise.report import assumes
+from haploop.tools.advise.report import assumes, describe_hand
 from haploop.tools.advise.search import Found
 from haploop.tools.advise.subject import Assumed, make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop
@@ -78,7 +78,7 @@ def test_an_advice_says_first_that_it_is_an_upper_bound_goes_on_when_stopped_and
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout.splitlines()[-1])
     assert found["headline"].startswith("Upper bound, not advice: premium15 is taken as rigid")
-    assert "for a hand: of 0.269 kg, 6.43 N s/m and 105 N/m, each 20 % more or less" in found["advice"]
+    assert "for a hand: of 0.269 kg, 6.43 N s/m and 105 N/m, holding through a grip of " in found["advice"]
     assert "loses most: no friction: 0." in found["advice"]
     lines = (out / "walls.jsonl").read_text().splitlines()
     advised = load(out / "advice.toml")
@@ -123,6 +123,14 @@ def test_a_scene_shows_what_broke_a_wall_that_pushes_find_steady_and_none_shows_
     window = run_in_process(shown, KINDS, memory=MemoryLog())["window"]
     assert (shown.duration, window["from_s"]) == (1.75, 1.25)
     assert window["force_swing_N"] == pytest.approx(0.603, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("grip", "words"), [(None, "105 N/m, each"), ((3.6, 552.0), "a grip of 3.60 N s/m and 552 N/m, each")]
+)
+def test_the_hand_that_a_wall_is_for_is_told_with_its_grip(grip, words):
+    told: Any = SimpleNamespace(hand=(0.269, 6.43, 105.0), grip=grip)
+    assert f"{words} 20 % more or less" in describe_hand(told)
 
 
 def test_a_directory_of_something_else_is_refused(tmp_path):

@@ -40,6 +40,11 @@ def test_a_preset_gets_a_hand_and_says_so():
     assert asked.scene.clock.round_trip_delay == 0.001
 
 
+@pytest.mark.parametrize(("overrides", "words"), [(["hand.mass=0.05"], ", but for hand.mass as set;"), ([], "2012);")])
+def test_a_hand_taken_with_other_numbers_is_said_to_have_them(overrides, words):
+    assert words in make_subject("touch", None, "1 ms", None, overrides, KINDS).notes[0]
+
+
 def test_another_hand_keeps_the_force_of_the_scene():
     asked = make_subject(str(SCENES / "fig6a.toml"), "fu_cavusoglu_x", None, None, [], KINDS)
     assert value_at(asked.scene, "hand.grip.stiffness") == 379.5

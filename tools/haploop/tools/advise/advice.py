@@ -74,6 +74,7 @@ class Advice:
         uncertain: the factors between which each uncertain quantity, or assumed number, was taken.
         not_varied: what the loop has and was taken as described.
         hand: its mass, kg, damping, N s/m, and stiffness, N/m; None where there is none.
+        grip: through which it holds, N s/m and N/m; None where there is none.
         described: the limit of the loop as described, with the element advised or without any.
         changed, without: that after each change of the device, and without each cause of buzzing, best first.
         assumed: each assumed number with the limit at half and at double of it.
@@ -90,6 +91,7 @@ class Advice:
     uncertain: dict[str, tuple[float, float]]
     not_varied: tuple[str, ...]
     hand: tuple[float, float, float] | None
+    grip: tuple[float, float] | None
     found: Found
     formulas: tuple[Formula, ...]
     published: tuple[Published, ...]
@@ -135,6 +137,7 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
 
     changed, without = rows(altered), rows(ideal)
     by_number = dict(zip(otherwise, limits, strict=True))
+    held = loop.hand if scene.hand else None
     own, notes = None, [] if is_ideal(loop) or loop.transmission else [_RIGID]
     if subject.has_task and scene.wall and scene.wall.stiffness:
         wall = Tried(scene.wall.stiffness, tuple(scene.dissipation))
@@ -149,7 +152,8 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
         tried_by=task_words(loop),
         uncertain=(of := ranges(loop, keys)),
         not_varied=as_built(loop, of),
-        hand=(loop.hand.mass, loop.hand.damping, loop.hand.stiffness) if scene.hand and loop.hand else None,
+        hand=(held.mass, held.damping, held.stiffness) if held else None,
+        grip=(held.grip.damping, held.grip.stiffness) if held and held.grip else None,
         found=found,
         formulas=tuple(formulas(loop)),
         published=PUBLISHED.get(subject.name, ()),

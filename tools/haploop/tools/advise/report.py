@@ -24,7 +24,8 @@ _SHOWN_BY_NONE = "; no scene shows it: with friction solved exactly, as in a run
 # A changed limit tells something where it differs by more than how closely it is known.
 _TELLS = 1.2
 _NO_CHANGE, _NO_LOSS = "no single change that was tried gains a fifth", "no single change that was tried costs a sixth"
-_HAND = "of {0}, {1} and {2}, each 20 % more or less; another may make this wall buzz (--hand)"
+_HAND = "of {0} kg, {1} N s/m and {2} N/m{3}, each 20 % more or less; another may make this wall buzz (--hand)"
+_GRIP = ", holding through a grip of {0} N s/m and {1} N/m"
 _NO_HAND = "none but its force: a hand may make this wall buzz (--hand)"
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
 _ALONE = "{0} without one, searched and attacked alike"
@@ -57,8 +58,7 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     found, best = told.found, told.found.advised
     safe = _SAFE.format(format_stiffness(found.stiffness_N_m), best.family.phrase(best.values))
     lines = [("at most" if told.is_ideal else "safe up to", safe if found.stiffness_N_m else _NO_WALL)]
-    hand = [f"{fixed(value)} {unit}" for value, unit in zip(told.hand or (), ("kg", "N s/m", "N/m"), strict=False)]
-    lines.append(("for a hand", _HAND.format(*hand) if hand else _NO_HAND))
+    lines.append(("for a hand", describe_hand(told)))
     if found.as_assumed:
         lines.append(("assumes", assumes(told, found.as_assumed)))
     if found.stiffness_N_m and best.values:
@@ -101,6 +101,15 @@ def assumes(told: Advice, right: Best) -> str:
 def sentences(told: Advice) -> list[str]:
     """Returns headline and answer as lines of text."""
     return [told.headline, *(f"{name}: {words.rstrip('.')}." for name, words in answer(told))]
+
+
+def describe_hand(told: Advice) -> str:
+    """Describes the hand that the wall was tried with, with its grip."""
+    if not told.hand:
+        return _NO_HAND
+    mass, damping, stiffness = map(fixed, told.hand)
+    grip = _GRIP.format(*map(fixed, told.grip)) if told.grip else ""
+    return _HAND.format(mass, damping, stiffness, grip)
 
 
 def describe(failure: Failure) -> str:

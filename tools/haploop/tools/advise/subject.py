@@ -36,6 +36,8 @@ _TOO_LATE = (
     '"{0:g} ms" for milliseconds.'
 )
 
+_TAKEN = "The hand is {0}, a pen-like grip (Fu and Cavusoglu 2012){1}; --hand names another."
+_CHANGED = ", but for {0} as set"
 _NO_SPRING = (
     "The scene's wall is of the kind {0}; advice is on springs, which are what it tries. "
     "Take wall.kind out to be advised on a spring."
@@ -102,7 +104,8 @@ def make_subject(
     has_task = not {"wall", "duration"}.isdisjoint(layers.data)
     if hand is None and not has_task and "hand" not in layers.data:
         hand = DEFAULT_HAND
-        notes.append(f"The hand is {hand}, a pen-like grip (Fu and Cavusoglu 2012); --hand names another.")
+        set_keys = [key for each in overrides if (key := each.partition("=")[0].strip()).startswith("hand.")]
+        notes.append(_TAKEN.format(hand, _CHANGED.format(", ".join(set_keys)) if set_keys else ""))
     if hand is not None:
         _lay_hand(layers, hand)
     if estimator is not None:
