@@ -27,8 +27,9 @@ ONE = Best(UNIDIRECTIONAL, (2e-3,), limit(2700.0), limit(1800.0))
 FOUND = Found((ALONE, DAMPED, TWO, ONE), DAMPED, 1640.0, None, None, 10, fell=((TWO, 1530.0),), alone_N_m=910.0)
 NONE_KNOWN = Formula("K <= 2 b / T", "", "", "its source", 0.0)
 ADVICE = Advice(
-    name="mine", notes=(), is_ideal=False, tried_by="a tap", uncertain={}, not_varied=(), hand=None, grip=None, found=FOUND,
-    formulas=(NONE_KNOWN, replace(NONE_KNOWN, stiffness_N_m=math.inf)), published=(Published(800.0, "a maker", ""),),
+    name="mine", notes=(), is_ideal=False, tried_by="a tap", uncertain={}, not_varied=(), hand=None, grip=None,
+    found=FOUND, formulas=(NONE_KNOWN, replace(NONE_KNOWN, stiffness_N_m=math.inf)),
+    published=(Published(800.0, "a maker", ""),),
     described=limit(2900.0), changed=(Changed("ticks twice as often", limit(5800.0), 2.0),),
     without=(Changed("no friction", limit(127.0), 0.04), Changed("no actuator", limit(2750.0), 0.95)), assumed=(),
     own=None, scene=None, breaks=None, runs=1,
