@@ -40,7 +40,7 @@ export function line(u, xs, ys, drawn) {
 }
 
 // A line that goes up and down more than so many times the chart's height is rough, if it has a point a pixel or so.
-const ROUGH = 20;
+const ROUGH = 50;
 const POINTS_A_PIXEL = 0.6;
 // A strip this thick, in lines, or where strips fill this part of what they cover together, is filled faintly.
 const THICK = 4;
