@@ -42,6 +42,8 @@ def deep(levels: int) -> dict[str, Any]:
         ("set", {"set": {f"wall.k{i}": 1.0 for i in range(10_000)}}, "at most 64 keys and values"),
         ("set", {"set": [0.0] * 1000}, "at most 64 keys and values"),
         ("set", {"set": deep(300)}, "3 tables deep"),
+        ("set", {"set": {}}, "Nothing was set: a set names a key at least"),
+        ("pace", {"pace": "x"}, "A pace is a number from 1e-06 to 1e+06, or free, but 'x' was asked for."),
         ("swap", {"swap": {"kind": [[[[]]]]}}, "3 tables deep"),
         ("set", {"set": {"w" * 201: 1.0}}, "at most 200 letters, but one has 201"),
         ("set", {"set": {"wall.stiffness": "1 " + "m " * 200}}, "at most 200 letters"),
@@ -184,3 +186,14 @@ def test_no_way_back_is_told_where_one_swap_cannot_go_it() -> None:
     ok, text, _ = at_once(subject, "undo", {})
     assert not ok
     assert "cannot be undone" in text
+
+
+def test_a_set_tells_what_check_would_note_of_the_scene_as_it_then_is_and_tells_it_once() -> None:
+    subject = commands()
+    ok, text, data = at_once(subject, "set", {"set": {"wall.stiffness": 1e9}})
+    assert ok, text
+    assert data["notes"] == text.splitlines()[1:]
+    assert "wall.stiffness is 1e+09 N/m; is that the unit that was meant?" in text
+    for value in (1e9, 150.0):
+        ok, text, data = at_once(subject, "set", {"set": {"wall.stiffness": value}, "at": 0.5})
+        assert (ok, data["notes"]) == (True, []), text

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
 import weakref
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -151,8 +152,14 @@ class LiveLoop:
         return self._ask("status")
 
     def set(self, values: Mapping[str, Any], at: float | None = None) -> int:
-        """Changes numbers, ``{"wall.stiffness": "0.4 N/mm"}``, at once or at a simulated time; returns the tick."""
-        return self._ask("set", set=plain(values), at=at)["tick"]
+        """Changes numbers, ``{"wall.stiffness": "0.4 N/mm"}``, at once or at a simulated time; returns the tick.
+
+        What is in order then but may not be what was meant is told as a ``UserWarning``, as ``haploop check`` does.
+        """
+        done = self._ask("set", set=plain(values), at=at)
+        for note in done.get("notes", ()):
+            warnings.warn(note, stacklevel=2)
+        return done["tick"]
 
     def swap(
         self, kind: str, *, element: int = 0, at: float | None = None, reload: bool = False, **parameters: Any
@@ -182,7 +189,7 @@ class LiveLoop:
 
     def pace(self, rate: float) -> int:
         """Goes on at another pace, simulated seconds per second; infinite for as fast as it goes."""
-        return self._ask("pace", pace="free" if math.isinf(rate) else rate)["tick"]
+        return self._ask("pace", pace="free" if rate == math.inf else rate)["tick"]
 
     def step(self, ticks: int = 1) -> int:
         """Goes on for some control ticks and stands still; returns the tick once all of them are done."""

@@ -16,6 +16,7 @@ from haploop.launch.clock.plugin_swap import swap_plugin
 from haploop.launch.clock.reloads import Code, Reloads
 from haploop.launch.clock.roster import Roster
 from haploop.launch.clock.seen import when_seen
+from haploop.launch.plan.effects import notes
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.spec import OutputError
 from haploop.protocol.changes import Event, describe
@@ -219,6 +220,8 @@ class Commands:
         return f"{text}; to go back: {'undo' if code else f'swap {words}{where}'}", data | {"before": undo}
 
     def _set(self, set: dict[str, float], at: float | None = None) -> tuple[str, Message]:
+        if set == {}:
+            raise ClockError("Nothing was set: a set names a key at least, with its value, such as wall.stiffness.")
         before = self._clock.scene_at(self._clock.tick_at(at))
         tick = self._clock.change({"set": set}, at)
         back = {key: value_at(before, key) for key in set}
@@ -226,7 +229,10 @@ class Commands:
         what = ", ".join(f"{key} = {value}" for key, value in taken.items())
         words = " ".join(f'{key}="{value}"' if " " in value else f"{key}={value}" for key, value in were.items())
         self._undo_by.append((self._clock.newest, {"set": back}, None))
-        return f"{what} from {self._at(tick)} on; to go back: set {words}", {"tick": tick, "before": {"set": back}}
+        known, kinds = notes(before, self._spec.kinds), self._spec.kinds
+        new = [note for note in notes(self._clock.scene_at(tick), kinds) if note not in known]
+        text = f"{what} from {self._at(tick)} on; to go back: set {words}"
+        return "\n".join([text, *new]), {"tick": tick, "before": {"set": back}, "notes": new}
 
     def _undo(self) -> tuple[str, Message]:
         """Takes the last swap or set back: out of the future where it still lies there, else by another change at once.
