@@ -108,8 +108,8 @@ position = 0.0
     )
     assert [told.split(" is ")[0] for told in file_mistakes(path)] == [
         "top.toml:2: duration",
-        "top.toml:21: device",
         "top.toml:3: extends",
+        "top.toml:21: device",
     ]
     path.write_text(path.read_text().replace("extends = 3", ""))
     assert sorted(told.split(" is ")[0] for told in file_mistakes(path)) == sorted(
@@ -300,3 +300,14 @@ def test_an_encoder_has_its_resolution_or_both_bits_and_range(files):
     assert any('counts over 0.2 m are bits = 12 and range = "0.2 m"' in each for each in said)
     path.write_text(COUNTED + "resolution = 1e-6\n")
     assert file_mistakes(path)[0].startswith("top.toml:8: encoder.resolution stands beside bits or range.")
+
+
+def test_mistakes_come_by_line_and_a_wrong_duration_hides_none_of_the_clock(tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text(
+        'duration = "3 m"\n[device]\nmass = 0.1\ndampin = 1\n[wall]\nposition = 0\nstiffness = -1\n'
+        '[clock]\nplant_rate = 10000\ncontrol_rate = 3333\nround_trip_delay = "0.15 ms"\n'
+    )
+    assert [told.split(" is ")[0].removeprefix(f"{path}:") for told in file_mistakes(path)] == [
+        "1: duration", "4: device.dampin", "7: wall.stiffness", "10: clock.control_rate", "11: clock.round_trip_delay",
+    ]  # fmt: skip

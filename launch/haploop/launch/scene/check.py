@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 # Where the key ``kind`` says what else is in a table; a number stands for any.
 _TAGGED = {("hand", "force"), ("jitter",), ("dissipation", 0), ("event", 0, "swap")}
+_SOME_S = 1.0
 _OWN_KIND = " An element of yours comes with --plugin FILE."
 _FORMS = {
     "bool_type": "It must be true or false.",
@@ -134,11 +135,12 @@ def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:
     try:
         duration = scene.duration if scene else number_of(Scene, "duration").read(layers.data.get("duration"))
     except PydanticCustomError:
-        return None
+        duration = None
     if table is None:
         return None
-    try:
-        return Timebase.from_clock(table, duration)
+    try:  # a clock is checked by itself where the duration is none: a second is a whole number of ticks of any
+        time = Timebase.from_clock(table, _SOME_S if duration is None else duration)
+        return None if duration is None else time
     except TimebaseError as error:
         clock = table.as_dict()
         for sentence in str(error).splitlines():  # each begins with its key

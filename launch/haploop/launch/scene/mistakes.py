@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -42,10 +43,12 @@ class Mistake:
 
 
 class SceneError(ValueError):
-    """A scene that cannot be run; it holds every mistake."""
+    """A scene that cannot be run; it holds every mistake, by file and line."""
 
     def __init__(self, mistakes: Iterable[Mistake]) -> None:
-        self.mistakes = _without_twins(list(dict.fromkeys(mistakes)))
+        found = _without_twins(list(dict.fromkeys(mistakes)))
+        files = list(dict.fromkeys(one.file for one in found))
+        self.mistakes = sorted(found, key=lambda one: (files.index(one.file), one.line or math.inf))
         told = [str(mistake) for mistake in self.mistakes[:_MOST_TOLD]]
         more = len(self.mistakes) - len(told)
         super().__init__("\n".join([*told, f"... and {counted(more, 'more mistake')}."] if more else told))
