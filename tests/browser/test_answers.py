@@ -14,6 +14,7 @@ def test_without_a_run_it_says_how_to_start_one_and_offers_nothing_that_steers(s
     page = open_page(stand_in.url)
     expect(page.locator("#waiting")).to_contain_text("haploop run SCENE")
     expect(page.locator("#phase")).to_have_text("waiting")
+    expect(page.locator("#notice")).to_have_text("")  # the middle of the page says it
     expect(page.locator("#pause")).to_be_disabled()
     expect(page.locator("#swap")).to_be_hidden()
     expect(page.locator("#verdict span")).to_have_text("no verdict")

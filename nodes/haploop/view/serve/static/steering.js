@@ -18,7 +18,8 @@ export const obstacle = (phase) => REASONS[phase] ?? (maySteer() ? "" : WATCHING
 export function allow(phase, why) {
   const reason = obstacle(phase);
   for (const fieldset of document.querySelectorAll("fieldset[data-steers]")) fieldset.disabled = reason !== "";
-  put(byId("notice"), [reason, why && why[0].toUpperCase() + why.slice(1).replace(/[^.]$/, "$&.")].filter(Boolean).join(" "));
+  const told = phase === "waiting" ? "" : reason; // the middle of the page says it there
+  put(byId("notice"), [told, why && why[0].toUpperCase() + why.slice(1).replace(/[^.]$/, "$&.")].filter(Boolean).join(" "));
 }
 
 export class Steering {
