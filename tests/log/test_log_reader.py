@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from haploop.logger import read
 from haploop.logger.log import LogError
+from haploop.logger.log.recording import Recording, Table
 from haploop.logger.log.writer import Compression, Log
 
 PLANT = {"timestamp": "s", "t": "s", "x": "m", "v": "m/s", "force": "N"}
@@ -158,3 +159,13 @@ def test_a_wrong_name_is_answered_with_the_right_ones(tmp_path: Path) -> None:
 def test_importing_the_logger_imports_no_heavy_library() -> None:
     code = "import sys, haploop.logger; print({'numpy', 'mcap', 'msgpack', 'lz4'} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
+
+
+def test_a_recording_and_its_tables_print_as_names_units_and_rows_without_numbers():
+    table = Table([("t", np.linspace(0.0, 7.7, 5)), ("n", np.zeros(5))], {"t": "s", "n": ""})
+    assert repr(table) == "<5 rows of t (s), n>"
+    assert repr(Table([], {})) == "<0 rows of no columns>"
+    kept = Recording({"/plant": table, "/events": [{"stop": True}]}, "It ends early.", {})
+    assert repr(kept).splitlines() == [
+        "<recording, cut: It ends early.>", "/plant: <5 rows of t (s), n>", "/events: <1 maps>",
+    ]  # fmt: skip

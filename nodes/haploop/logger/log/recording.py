@@ -37,6 +37,11 @@ class Table(dict[str, Floats]):
     def __missing__(self, name: str) -> NoReturn:
         raise KeyError(f"There is no column {name}{meant(name, self)}; the columns are {', '.join(self)}.")
 
+    def __repr__(self) -> str:
+        rows = len(next(iter(self.values()), ()))
+        names = (f"{name} ({unit})" if unit else name for name, unit in self.units.items())
+        return f"<{rows} rows of {', '.join(names) or 'no columns'}>"
+
     def quantity(self, name: str) -> pint.Quantity[Floats]:
         """Returns a column with its unit, as a quantity of pint's application registry."""
         import pint
@@ -77,6 +82,12 @@ class Recording(dict[str, Any]):
         self.truncated = bool(cut)
         self.cut = cut
         self.attachments = attachments
+
+    def __repr__(self) -> str:
+        lines = (
+            f"{topic}: {rows if isinstance(rows, Table) else f'<{len(rows)} maps>'}" for topic, rows in self.items()
+        )
+        return "\n".join([f"<recording{', cut: ' * self.truncated}{self.cut}>", *lines])
 
     def __missing__(self, topic: str) -> NoReturn:
         hint, known = meant(topic, self), ", ".join(self) or "none"
