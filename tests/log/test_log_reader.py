@@ -17,6 +17,7 @@ from haploop.logger import read
 from haploop.logger.log import LogError
 from haploop.logger.log.recording import Recording, Table
 from haploop.logger.log.writer import Compression, Log
+from haploop.tools.cli.options import what_was_logged
 
 PLANT = {"timestamp": "s", "t": "s", "x": "m", "v": "m/s", "force": "N"}
 
@@ -169,3 +170,14 @@ def test_a_recording_and_its_tables_print_as_names_units_and_rows_without_number
     assert repr(kept).splitlines() == [
         "<recording, cut: It ends early.>", "/plant: <5 rows of t (s), n>", "/events: <1 maps>",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("controller_s", "said"), [(0.37, ": /plant to 0.300 s, /controller to 0.370 s."), (0.3, ".")])
+def test_of_a_run_that_failed_it_is_said_until_when_each_part_was_logged_where_they_end_apart(
+    tmp_path: Path, controller_s: float, said: str
+) -> None:
+    with Log(tmp_path / "log.mcap") as log:
+        for topic, end_s in (("/plant", 0.3), ("/controller", controller_s)):
+            channel = log.channel(topic, {"timestamp": "s"}, title=topic)
+            log.write(channel, np.arange(2), np.array([[0.0], [end_s]]))
+    assert what_was_logged(tmp_path).startswith(f"What was logged is in {tmp_path}{said}")

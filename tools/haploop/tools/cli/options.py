@@ -69,12 +69,30 @@ def parse_seconds(text: str | None, option: str = "--at") -> float | None:
 
 
 FAILED, WRONG_USE = 1, 2
+# Parts of a log that end within this, s, are said to end together.
+_APART_S = 0.01
+_LOGGED = "What was logged is in {0}: {1}. The books end where the first of these does."
 
 
 def leave(message: str, status: int) -> NoReturn:
     """Prints a message for people and exits."""
     print(message, file=sys.stderr)
     raise SystemExit(status)
+
+
+def what_was_logged(directory: Path) -> str:
+    """Tells where the log of a run that failed is and, where its parts end apart, until when each was logged."""
+    from haploop.logger import stream
+    from haploop.logger.log import LogError
+
+    ends: dict[str, float] = {}
+    with suppress(LogError, OSError):
+        for batch in stream(directory, columns=["timestamp"]):
+            if not isinstance(batch.rows, list) and len(batch.log_times_ns):
+                ends[batch.topic] = float(batch.rows["timestamp"][-1])
+    if not ends or max(ends.values()) - min(ends.values()) < _APART_S:
+        return f"What was logged is in {directory}."
+    return _LOGGED.format(directory, ", ".join(f"{topic} to {end_s:.3f} s" for topic, end_s in ends.items()))
 
 
 def print_json(data: Any) -> None:

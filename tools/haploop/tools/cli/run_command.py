@@ -23,6 +23,7 @@ from haploop.tools.cli.options import (
     parse_seconds,
     plain_errors,
     print_json,
+    what_was_logged,
 )
 from haploop.tools.cli.scenes import print_notes
 from haploop.tools.cli.view import UntilClosed
@@ -117,7 +118,7 @@ def run(
                     start_gate=viewer.may_start,
                 )
         except RunFailed as error:
-            leave(f"{error}\nWhat was logged is in {prepared.out}.", FAILED)
+            leave(f"{error}\n{what_was_logged(prepared.out)}", FAILED)
         except KeyboardInterrupt:
             discard(prepared.out, prepared.is_new)  # where it never began
             begun = (prepared.out / SCENE).exists()

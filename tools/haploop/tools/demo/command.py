@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from haploop.tools.cli.interrupt import LeavingAtOnce
-from haploop.tools.cli.options import FAILED, leave, plain_errors
+from haploop.tools.cli.options import FAILED, leave, plain_errors, what_was_logged
 
 SCENE, FIGURE = "demo", "figure.png"
 
@@ -45,7 +45,7 @@ def demo(
         try:
             story = tell(lay_out(scene.scene, dict(scene.kinds), directory, is_new=True))
         except RunFailed as error:
-            leave(f"{error}\nWhat was logged is in {directory}.", FAILED)
+            leave(f"{error}\n{what_was_logged(directory)}", FAILED)
         except KeyboardInterrupt:
             leave(f"Interrupted; what was logged is in {directory}.", FAILED)
         console().print(report(story))
