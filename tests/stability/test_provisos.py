@@ -100,11 +100,14 @@ def test_a_limit_cycle_that_no_hand_feels_is_told_so_beside_the_word_and_in_micr
 
 
 @pytest.mark.parametrize(
-    ("rate_1_s", "error_1_s", "is_told"), [(-1.25, 0.009, True), (-1.25, 0.5, False), (0.0, 1.0, False)]
-)
-def test_what_no_hand_feels_is_told_to_decay_still_where_it_does_by_three_standard_errors(rate_1_s, error_1_s, is_told):
+    ("rate_1_s", "error_1_s", "said"),
+    [(-1.25, 0.009, ", and still decaying by 1.25 +- 0.009 1/s."),
+     (0.2, 0.01, ", and still growing by 0.2 +- 0.01 1/s."),
+     (-1.25, 0.5, "."), (0.2, 0.1, "."), (0.0, 1.0, ".")],
+)  # fmt: skip
+def test_what_no_hand_feels_is_told_to_decay_or_grow_where_it_does_by_three_standard_errors(rate_1_s, error_1_s, said):
     finding = Finding("steady", "unfelt", 1.0, 4.0, rate_1_s, error_1_s, 12.5, 1.9e-5, settles_s=2.4)
-    assert finding.sentence().endswith("feels, and still decaying by 1.25 +- 0.009 1/s." if is_told else "feels.")
+    assert finding.sentence().endswith("feels" + said)
 
 
 def test_of_an_unfelt_swing_that_was_there_all_along_no_time_is_told_after_which_it_came(monkeypatch):
