@@ -96,6 +96,10 @@ def test_diff_tells_it_as_a_table_and_as_one_json_object(runs):
     rows = [line.split("  ")[0].strip() for line in told.stdout.splitlines()]
     assert {"force, peak to peak", "pushed, it swings by", "wall and elements together"} <= {*map(str.strip, rows)}
     assert "[swapped]" in told.stdout, "brackets are no markup"
+    assert re.search(r"event.0.at +– +1 s", told.stdout)
+    assert re.search(r"event.0.set.wall.stiffness +– +90", told.stdout)
+    bare = haploop("diff", runs["a"], runs["bare"]).stdout
+    assert re.search(r"dissipation.0.mass +0.01 kg +–", bare)
     assert json.loads(haploop("diff", runs["a"], runs["swapped"], "--json").stdout)["parting"]["column"] == "wall"
     assert "holds no log.mcap" in haploop("diff", runs["a"], runs["a"].parent).stderr
 
@@ -103,7 +107,7 @@ def test_diff_tells_it_as_a_table_and_as_one_json_object(runs):
 def test_an_overlay_draws_every_run_with_its_name_and_what_differs(runs):
     given = data(runs, "a", "swapped", "killed", "slow")
     figure = make_overlay(given)
-    assert len(artists(figure, "position")) == 2 * len(given) - 1, "the killed one has no close view"
+    assert len(artists(figure, "position")) == 2 * len(given), "the close view is where the killed one is, too"
     told = [text.get_text() for text in artists(figure, "label")]
     # What has no room is cut off.
     assert all(full.startswith(seen.rstrip(" …")) for full, seen in zip(labels(given), told, strict=True))
@@ -123,6 +127,20 @@ def test_an_overlay_draws_every_run_with_its_name_and_what_differs(runs):
     drawn = artists(figure, "energy")[0].get_ydata()
     taken_J = given[0].books()[-1].true_J
     assert drawn[-1] / drawn.min() == pytest.approx(taken_J[-1] / taken_J.min())
+
+
+def test_the_close_view_of_runs_of_unlike_length_is_where_all_of_them_are(runs, tmp_path):
+    short = made(tmp_path / "short", "duration=1.2")
+    given = [RunData.from_directory(short), *data(runs, "a")]
+    assert given[1].close_s()[1] > given[0].span_s[1], "the last of the longer is beyond the end of the shorter"
+    closer = next(ax for ax in make_overlay(given).get_axes() if ax.get_title(loc="left") == "Position, close view")
+    assert closer.get_xlim()[1] <= given[0].span_s[1] + 0.01
+    assert len(artists(closer, "position")) == 2
+
+
+def test_each_overlay_has_a_file_of_its_own_in_the_first_directory(runs):
+    for other in ("again", "bare"):
+        assert haploop("plot", runs["a"], runs[other]).stdout.strip() == str(runs["a"] / f"with_{other}.png")
 
 
 def test_beside_a_verdict_its_provisos_are_told_in_full_in_overlay_and_table(runs):

@@ -84,6 +84,19 @@ def test_the_header_tells_the_window_as_the_end_only_where_it_is(runs: dict[str,
     assert key_numbers(data)[0].startswith("from 0.2 to 0.7 s: ")
 
 
+def test_the_figure_of_a_run_that_failed_says_so_and_why(runs: dict[str, Path]) -> None:
+    data = RunData.from_directory(runs["swap"])
+    data.summary |= {
+        "ended": "failed",
+        "why": "The controller failed: Element 0 (mine) gave no force.",
+        "verdict": "undecided",
+    }
+    figure = make_figure(data)
+    assert [text.get_text() for text in artists(figure, "verdict")] == ["failed"]
+    [footer] = artists(figure, "events")
+    assert footer.get_text().startswith("The controller failed: Element 0 (mine) gave no force.")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.4, 0.8])
 def test_a_run_that_was_killed_still_draws(runs: dict[str, Path], tmp_path: Path, share: float) -> None:

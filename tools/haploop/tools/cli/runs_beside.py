@@ -98,7 +98,9 @@ def difference_table(found: Difference) -> RenderableType:
     table.add_row("title", *(Text(name, "bold") for name in found.names))
     table.add_section()
     for key, pair in found.scene.items():
-        table.add_row(Text(key), *(Text(scene_value(value)) for value in pair))
+        units = (f" {found.units[key]}" if isinstance(value, int | float) else "" for value in pair)
+        told = [f"{scene_value(value)}{unit}" for value, unit in zip(pair, units, strict=True)]
+        table.add_row(Text(key), *map(Text, map(str.rstrip, told)))
     if not found.scene:
         table.add_row("scene", "the same", "the same")
     table.add_section()

@@ -12,6 +12,7 @@ import numpy as np
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Tables
 from haploop.tools.figure.data import TOGETHER, RunData
+from haploop.tools.figure.scene_units import unit_at
 from haploop.tools.render.report import plant_books
 from haploop.tools.render.terminal import told
 
@@ -34,6 +35,7 @@ class Difference:
     Attributes:
         runs: their directories, the part that tells them apart; names: their titles.
         scene: dotted key -> both values, where they are not the same; None where one scene has no such key.
+        units: of the numbers among these keys, "" for none.
         results: what came of each run, by words: verdict, end, hash.
         energies_J: by the name of the book, in J; None where one has no such book.
         ticks: that both logs hold.
@@ -43,6 +45,7 @@ class Difference:
     runs: tuple[str, str]
     names: tuple[str, str]
     scene: Mapping[str, Pair]
+    units: Mapping[str, str]
     results: Mapping[str, Pair]
     energies_J: Mapping[str, tuple[float | None, float | None]]
     ticks: int
@@ -55,10 +58,12 @@ def difference(a: RunData, b: RunData, *, runs: tuple[str, str] = ("first", "sec
     ticks, parting, why_not = _parting(a, b)
     results = [_results(run) for run in (a, b)]
     energies = [_energies_J(run) for run in (a, b)]
+    scene = unlike_keys([a.scene, b.scene])
     return Difference(
         runs=runs,
         names=(a.scene.title, b.scene.title),
-        scene=unlike_keys([a.scene, b.scene]),
+        scene=scene,
+        units={key: unit_at(a.scene, key, a.units) or unit_at(b.scene, key, b.units) for key in scene},
         results={name: (results[0].get(name), results[1].get(name)) for name in results[0] | results[1]},
         energies_J={name: (energies[0].get(name), energies[1].get(name)) for name in energies[0] | energies[1]},
         ticks=ticks,

@@ -11,10 +11,9 @@ import numpy as np
 from haploop.tools.figure import style
 from haploop.tools.figure.data import Book, FigureError, RunData
 from haploop.tools.figure.difference import scene_value, unlike_keys
-from haploop.tools.figure.run_figure import key_numbers
+from haploop.tools.figure.run_figure import badge, key_numbers
 from haploop.tools.figure.scene_units import unit_at
 from haploop.tools.figure.time import MM, line
-from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount, parameters, prefix_for
 
 if TYPE_CHECKING:
@@ -27,6 +26,8 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#332288")
 _WIDTHS = (2.8, 2.1, 1.6, 1.2, 0.9, 0.6)
 # Keys in which scenes differ that a line of the legend has room for.
 _MOST_KEYS = 3
+# A longer name of a file is cut.
+_LONGEST_NAME = 150
 
 
 def draw_overlay(directories: Sequence[Path], target: Path | None = None) -> Path:
@@ -34,7 +35,7 @@ def draw_overlay(directories: Sequence[Path], target: Path | None = None) -> Pat
 
     Args:
         directories: of runs, two to ``MOST_RUNS``; of one that was killed, what its log holds is drawn.
-        target: file of the figure; ``overlay.png`` in the first directory when None.
+        target: file of the figure; in the first directory when None, named after the others.
 
     Raises:
         FigureError: matplotlib is missing, there is nothing to draw, there are too many, or the file cannot be written.
@@ -45,7 +46,8 @@ def draw_overlay(directories: Sequence[Path], target: Path | None = None) -> Pat
             f"At most {MOST_RUNS} runs can be told apart in one figure, but {len(directories)} were given."
         )
     runs = [RunData.from_directory(directory) for directory in directories]
-    return style.write_figure(make_overlay(runs), target or directories[0] / "overlay.png")
+    others = "_".join(directory.resolve().name for directory in directories[1:])
+    return style.write_figure(make_overlay(runs), target or directories[0] / f"with_{others[:_LONGEST_NAME]}.png")
 
 
 def make_overlay(runs: Sequence[RunData]) -> Figure:
@@ -55,7 +57,8 @@ def make_overlay(runs: Sequence[RunData]) -> Figure:
     rows = len(runs) + (is_titled := told[0] != runs[0].scene.title and not told[0].startswith(runs[0].scene.title))
     header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.02 + 0.025 * rows, 1.0))[:, 0]
     span_s = min(run.span_s[0] for run in runs), max(run.span_s[1] for run in runs)
-    close_s = max(run.close_s() for run in runs)  # the one that begins last
+    ends_s = min(run.span_s[1] for run in runs)  # where all have something to show
+    close_s = max(run.close_s() for run in runs if run.span_s[1] - ends_s < 1.5 / run.control_rate)
     grid = body.add_gridspec(3, 2, width_ratios=(1.9, 1.25))
     for column, (seen_s, more) in enumerate(((span_s, ""), (close_s, ", close view"))):
         _positions(body.add_subplot(grid[0, column]), runs, seen_s, f"Position{more}")
@@ -110,9 +113,8 @@ def _head(header: Figure | SubFigure, run: RunData, label: str, y: float, colour
     from matplotlib.lines import Line2D
 
     header.add_artist(Line2D([0.008, 0.028], [y, y], color=colour, linewidth=3.0, gid="run"))
-    word = told(run.summary) if run.summary else "no verdict"
     look: dict[str, Any] = {"va": "center", "fontsize": style.TEXT + 1}
-    header.text(0.034, y, word, color=style.verdict_colour(run.summary), fontweight="bold", gid="verdict", **look)
+    header.text(0.034, y, badge(run), color=style.verdict_colour(run.summary), fontweight="bold", gid="verdict", **look)
     name = header.text(0.115, y, label, color=style.INK, gid="label", **look)
     style.fit_text(name, header.bbox.width * 0.56)
     numbers = header.text(0.69, y, _numbers(run), color=style.GREY, gid="numbers", **look)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 # What has room in the table and below the figure; longer names of books are smaller.
 _MOST_BOOKS, _NAME_LETTERS, _MOST_LINES, _LINE_LETTERS = 7, 56, 2, 225
 
+# Badge of a run that failed, and how its summary says so.
+_FAILED = "failed"
 _GAP = "   ·   "
 
 # Books of the plant that belong to a force which is drawn.
@@ -47,7 +50,7 @@ def make_figure(run: RunData) -> Figure:
     """Makes the figure of a run, with all panels; FigureError where matplotlib is missing."""
     rows = 3 + bool(own_columns(run))
     figure = style.empty_figure(15.0, 9.2 + 2.9 * (rows - 3))
-    events = event_lines(run)
+    events = [*textwrap.wrap(failure(run), _LINE_LETTERS - 30), *event_lines(run)]
     heights = 0.085, 1.0, 0.001 + 0.025 * len(events)
     header, body, footer = figure.subfigures(3, 1, squeeze=False, height_ratios=heights)[:, 0]
     grid = body.add_gridspec(rows, 3, width_ratios=(1.9, 1.25, 1.15))
@@ -78,7 +81,7 @@ def make_figure(run: RunData) -> Figure:
 
 
 def _draw_header(figure: Figure | SubFigure, run: RunData) -> None:
-    word = told(run.summary) if run.summary else "no verdict"
+    word = badge(run)
     sign = figure.text(
         0.012, 0.66, word, fontsize=style.LARGE, fontweight="bold", color="white", va="center", gid="verdict",
         bbox={"boxstyle": "round,pad=0.35", "facecolor": style.verdict_colour(run.summary), "linewidth": 0},
@@ -93,6 +96,16 @@ def _draw_header(figure: Figure | SubFigure, run: RunData) -> None:
         half = (len(words) + 1) // 2
         numbers.set_text(f"{_GAP.join(words[:half])}\n{_GAP.join(words[half:])}")
     style.fit_text(numbers, room_px)
+
+
+def badge(run: RunData) -> str:
+    """Returns the verdict, that a run failed, or that it has none."""
+    return _FAILED if failure(run) else told(run.summary) if run.summary else "no verdict"
+
+
+def failure(run: RunData) -> str:
+    """Returns why the run failed, a sentence; "" where it did not."""
+    return run.summary["why"] if run.summary and run.summary["ended"] == _FAILED else ""
 
 
 def key_numbers(run: RunData) -> list[str]:
