@@ -91,6 +91,14 @@ def test_parquet_holds_every_column_with_its_unit_in_the_schema(run: Path, log: 
     assert events[0]["timestamp"] == 0.15
 
 
+def test_pandas_reads_a_parquet_file_with_its_units(run: Path, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    pandas = pytest.importorskip("pandas")
+    export(run, "parquet", "--out", str(tmp_path))
+    for topic, units in TABLES.items():
+        assert pandas.read_parquet(tmp_path / f"{topic[1:]}.parquet").attrs == {"units": units}
+
+
 def test_a_long_parquet_file_comes_in_groups_that_are_read_one_by_one(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     run = swapped_run(tmp_path / "run", 20_000, hard=False, flush_ticks=2_000)

@@ -6,7 +6,7 @@ of ``pandas.read_csv``, or a double click on the file, does; pandas before 3 rou
 told ``float_precision="round_trip"``.
 
 Parquet: float64 columns; ``pyarrow.parquet.read_schema(file).field("x").metadata[b"unit"]`` is the unit of a column;
-pandas and polars read the files as they are.
+pandas and polars read the files as they are, and pandas has the units in ``attrs["units"]``.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ Units = Mapping[str, Mapping[str, str]]
 # A topic of free maps becomes a table of these two columns: time, and the map as JSON.
 MESSAGE = "message"
 MAP_UNITS = {TIMESTAMP: "s", MESSAGE: ""}
+# Key of a Parquet file's metadata from which pandas takes the ``attrs`` of a frame, as JSON.
+_PANDAS = "PANDAS_ATTRS"
 # Rows of a group of a Parquet file, which a reader can read by itself.
 _GROUP_ROWS = 1 << 16
 
@@ -131,10 +133,11 @@ class ParquetWriter(ExportWriter):
 
     def _schema(self, units: Mapping[str, str]) -> Any:
         arrow = self._arrow
-        return arrow.schema(
+        fields = [
             arrow.field(name, arrow.string() if name == MESSAGE else arrow.float64(), metadata={"unit": unit})
             for name, unit in units.items()
-        )
+        ]
+        return arrow.schema(fields, metadata={_PANDAS: json.dumps({"units": dict(units)})})
 
     def add(self, batch: Batch) -> None:
         held = self._held[batch.topic]
