@@ -55,7 +55,7 @@ def test_a_loop_that_is_judged_at_its_end_may_have_been_changed_just_before():
     assert run(scene, in_process=True)["verdict"] == "steady"
 
 
-def test_a_run_that_fails_is_undecided_in_its_summary_figure_report_and_page(tmp_path):
+def test_a_run_that_fails_is_undecided_in_its_summary_report_and_page_and_failed_in_its_figure(tmp_path):
     """Even at rest for long before: the same run without the fault is steady."""
     plugin, out = tmp_path / "brake.py", tmp_path / "run"
     for fault, word in (("pass", "steady"), ("if self.tick > 1400: raise ValueError('deep')", "undecided")):
@@ -72,7 +72,7 @@ def test_a_run_that_fails_is_undecided_in_its_summary_figure_report_and_page(tmp
     assert (summary["ended"], summary["verdict"]) == ("failed", "undecided")
     assert summary["verdict_rule"].startswith("The run failed, and nothing tells how it would have gone on. In the")
     assert shown(summary_table(summary)).startswith("undecided")
-    assert words(make_figure(RunData.from_directory(out / "undecided")), "verdict") == ["undecided"]
+    assert words(make_figure(RunData.from_directory(out / "undecided")), "verdict") == ["failed"]
     session = cast(Any, SimpleNamespace(summary=summary, scene=spec.scene, outcome="failed"))
     assert cast(Any, RunSession.verdict_is).fget(session) == "judged", "the page has the word of the summary"
 

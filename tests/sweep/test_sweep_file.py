@@ -150,15 +150,15 @@ holds = "stedy"
 """
     found = mistakes(tmp_path, text)
     expected = [
-        "repeat is 0. It must be at least 1.",
-        'bisect.holds is "stedy"; did you mean steady?',
         "titel is not a key of a sweep; did you mean title?",
+        "repeat is 0. It must be at least 1.",
+        'record.0 is "window.oscilation_m"; did you mean window.oscillation_m?',
+        'record.1 is "window". It is a table; name one of window.from_s',
         'set.wall.position is "3 kg". kg is a mass',
         "axes.wall.stifness is not a key of [wall]; did you mean stiffness?",
         'axes.dissipation.0.damping.to is "10 kg". kg is a mass',
         "axes.clock.round_trip_delay.1 is nan. It must be a finite number of s.",
-        'record.0 is "window.oscilation_m"; did you mean window.oscillation_m?',
-        'record.1 is "window". It is a table; name one of window.from_s',
+        'bisect.holds is "stedy"; did you mean steady?',
     ]
     assert len(found) == len(expected)
     for sentence, begin in zip(found, expected, strict=True):
