@@ -40,7 +40,7 @@ HAND_MOVES, NOISE, UNFELT = "the hand's motion", "noise", "less than a hand feel
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
 _COUNTS = 10
 
-# A width below this is told in micrometres; what decays by less than this has come to its end.
+# A width below this is told in micrometres; what changes by less than this has come to its end.
 _FINE_UM, _STILL_1_S = 10.0, 0.05
 
 WHY = {
@@ -49,9 +49,9 @@ WHY = {
     "rest": "After a push of {push_N:.3g} N it came to rest, to 5 % within {settles_s:.2g} s.",
     "unmoved": "After a push of {push_N:.3g} N, which did not move it, it rested.",
     "unfelt": "After a push of {push_N:.3g} N it came to rest within {settles_s:.2g} s but for "
-    "{width_um:.3g} µm peak to peak, most at {frequency_Hz:.3g} Hz: less than a hand feels{still}.",
+    "{width_um:.3g} µm peak to peak, most at {frequency_Hz:.3g} Hz: less than a hand feels{decaying}.",
     "unfelt throughout": "After a push of {push_N:.3g} N it swung by no more than {width_um:.3g} µm peak to peak, most "
-    "at {frequency_Hz:.3g} Hz: less than a hand feels{still}.",
+    "at {frequency_Hz:.3g} Hz: less than a hand feels{decaying}.",
     "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width} peak to peak at "
     "{frequency_Hz:.3g} Hz.",
     "lasts": "Swings of {width} peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, growing "
@@ -70,7 +70,7 @@ WHY = {
     "{rate_1_s:.2g} +- {error_1_s:.2g} 1/s, too slowly, or too unlike the other, to tell within {watched_s:g} s; "
     "{run} might tell.",
 }
-STILL = ", and still {0} by {1:.3g} +- {2:.2g} 1/s"
+DECAYING = ", and still decaying by {0:.3g} +- {1:.2g} 1/s"
 # What is said beside that after a blow, and of the loop without its friction.
 AFTER_BLOW = {
     "rests": " It did after blows of {blow_N:.3g} N for 0.05 s, into the wall and off it, too.",
@@ -211,12 +211,10 @@ class Finding:
         own_m = 0.0 if self.why == "decays" else self.width_m
         return min(own_m / seen_m, 1.0) if own_m < _WIDER * seen_m else None
 
-    def _still(self) -> str:
-        """Returns how what is left changes yet, beyond three standard errors; "" where it does not."""
+    def _decaying(self) -> str:
+        """Returns whether what is left becomes less yet, beyond three standard errors; "" where it does not."""
         rate_1_s, error_1_s = self.rate_1_s or 0.0, self.error_1_s or 0.0
-        goes = "decaying" if rate_1_s < 0.0 else "growing"
-        sure = abs(rate_1_s) > max(3.0 * error_1_s, _STILL_1_S)
-        return STILL.format(goes, abs(rate_1_s), error_1_s) if sure else ""
+        return DECAYING.format(-rate_1_s, error_1_s) if rate_1_s < -max(3.0 * error_1_s, _STILL_1_S) else ""
 
     def sentence(self) -> str:
         """Returns why, with its numbers."""
@@ -225,7 +223,7 @@ class Finding:
         width = f"{1e-3 * width_um:.3g} mm" if width_um >= _FINE_UM else f"{width_um:.3g} µm"
         about_s = float(f"{numbers['needs_s']:.2g}")
         run = f"some {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
-        sentence = WHY[self.why].format(**numbers, width=width, width_um=width_um, run=run, still=self._still())
+        sentence = WHY[self.why].format(**numbers, width=width, width_um=width_um, run=run, decaying=self._decaying())
         sentence += AFTER_BLOW[self.blown].format(**numbers) if self.blown else ""
         sentence += AT_HARDEST[self.at_hardest].format(**numbers) if self.at_hardest else ""
         return sentence + (FRICTIONLESS[self.frictionless] if self.frictionless else "")
@@ -246,7 +244,9 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     is_long, changes = swing.watched_s >= _LONG_S, [*zip(swing.changes, swing.errors, strict=True)]
     # Of what is too slow for its pieces all of its way counts, since they show but a part of it.
     size_m = swing.width_m if swing.covers else swing.moved_m
-    rising = any(change > max(_LASTING, 3 * error) for change, error in changes)
+    # In half of a short watch even what grows quickly changes little.
+    least = min(_LASTING, _STILL_1_S * swing.watched_s / 2.0)
+    rising = any(change > max(least, 3 * error) for change, error in changes)
     falling = max(swing.changes) < -_LASTING and (size_m < _SMALL_M or (is_long and swing.covers))
     forgets = swing.lasts(_LASTING) and SAME[0] < swing.at_last < SAME[1] and not 0.5 < swing.at_first < 2.0
     unfelt = swing.times_felt < 1.0 and not is_felt(swing.width_m, swing.frequency_Hz)
