@@ -15,12 +15,12 @@ from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.cli.app import app
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.outcome import ForceOutcome
-from haploop.tools.dissipate.report import conclusion, note_sentences
+from haploop.tools.dissipate.report import conclusion, make_report, note_sentences
 from haploop.tools.dissipate.samples import RecordingError
 from haploop.tools.dissipate.text_recording import Layout
 from helpers.data.recordings import outcome, write
 from helpers.scenes.least import KINDS, scene
-from helpers.shown import artists
+from helpers.shown import artists, shown
 
 K, SPEED, T = 800.0, 0.1, 1e-3
 DEEP = 50  # samples from the surface to the deepest point
@@ -189,6 +189,7 @@ def test_a_column_that_may_be_a_force_is_not_read_unasked_but_named(tmp_path: Pa
     found = outcome(path, dampings=["1.0"])
     assert found.force is None
     assert "Column Force was not read: --force Force books its work." in note_sentences(found)
+    assert shown(make_report(found)).count("was not read") == 1
 
 
 def test_elements_are_booked_as_without_a_force(tmp_path: Path) -> None:

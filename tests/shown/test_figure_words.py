@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from haploop.launch.runs.start import prepare, run
+from haploop.launch.scene.bundled import of_name
 from haploop.logger import read
 from haploop.tools.figure.data import FigureError, RunData
 from haploop.tools.figure.run_figure import draw, event_lines, key_numbers, make_figure
@@ -82,6 +84,15 @@ def test_the_header_tells_the_window_as_the_end_only_where_it_is(runs: dict[str,
     assert key_numbers(data)[0].startswith("in the last 0.5 s: ")
     data.summary |= {"duration_s": 0.7, "window": {**data.summary["window"], "from_s": 0.2}}
     assert key_numbers(data)[0].startswith("from 0.2 to 0.7 s: ")
+
+
+def test_the_loop_of_a_run_that_never_touches_its_wall_says_so_and_has_no_legend(tmp_path: Path) -> None:
+    away = ["duration=0.2", "wall.position=-1", 'run.verdict="window"']
+    run(prepare(of_name("fig6c", "scenes") or Path(), away, out=tmp_path / "away"), in_process=True)
+    figure = make_figure(RunData.from_directory(tmp_path / "away"))
+    ax = next(ax for ax in figure.get_axes() if "Force against" in ax.get_title("left"))
+    assert [text.get_text() for text in ax.texts] == ["The device does not touch the wall."]
+    assert ax.get_legend() is None
 
 
 def test_the_figure_of_a_run_that_failed_says_so_and_why(runs: dict[str, Path]) -> None:

@@ -74,11 +74,10 @@ def make_report(outcome: Outcome) -> RenderableType:
     for element in rows(outcome):
         table.add_row(*make_row(element))
     head = Text(f"{outcome.recording.name}: {conclusion(outcome)}", style="bold")
-    doubts = [
-        Text(sentence, style="bold yellow") for sentence in [*outcome.recording.notes.remarks, *filtered_out(outcome)]
-    ]
+    first = [*outcome.recording.notes.remarks, *filtered_out(outcome)]
+    doubts = [Text(sentence, style="bold yellow") for sentence in first]
     buzz = Text(buzz_sentence(outcome), style="bold" if outcome.buzz else "")
-    said = [*note_sentences(outcome), *([NEXT] if outcome.buzz else [])]
+    said = [sentence for sentence in note_sentences(outcome) if sentence not in first] + [NEXT] * bool(outcome.buzz)
     notes = (Text(sentence, style="dim") for sentence in said)
     return Group(*doubts, buzz, head, *([table] if rows(outcome) else []), *notes)
 

@@ -9,7 +9,8 @@ from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.render.units import amount
 
 _BUZZ: dict[Word, str] = {
-    "buzzes": "The recording buzzes: it swings at {frequency}, {width} peak to peak at most, {when}.",
+    "buzzes": "The recording buzzes: it swings at {frequency}, {width} peak to peak at most, {when}; "
+    "pauses of less than half a second are not told.",
     "none seen": (
         "No buzz was seen: no swing at one frequency above {above:g} Hz lasts {lasts:g} s and is wide enough to be "
         "felt. Swings at several frequencies at once are not looked for."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -47,15 +47,14 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
     """Draws force against penetration, pressing and releasing told apart, beside the wall it should be."""
     title = "Force against penetration"
     if not run.history.walls:
-        style.dress(ax, title, "", "")
-        ax.set_axis_off()
-        text = "No wall in this scene, so there is no\nforce against penetration to show."
-        look = {"fontsize": style.SMALL + 1, "color": style.GREY, "transform": ax.transAxes}
-        ax.text(0.5, 0.5, text, ha="center", va="center", **look)
+        _say(ax, title, "No wall in this scene, so there is no\nforce against penetration to show.")
         return
-    style.dress(ax, title, f"penetration{run.as_measured} (mm)", "force out of the wall (N)")
     early_depth, early_force = force_position_loop(run, run.early_s())
     depth, force = force_position_loop(run, span_s)
+    if not any((loop > 0.0).any() for loop in (early_depth, depth)):
+        _say(ax, title, "The device does not touch the wall.")
+        return
+    style.dress(ax, title, f"penetration{run.as_measured} (mm)", "force out of the wall (N)")
     early = {"color": style.EARLY, "linewidth": 0.8, "label": "first second of contact", "gid": "early"}
     ax.plot(early_depth * MM, early_force, **early)
     pressing = np.diff(depth, append=depth[-1:]) > 0
@@ -76,6 +75,14 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
     margin = 0.06 * (high - low) or 0.01
     ax.set_xlim(low - margin, high + margin)
     style.corner_legend(ax)
+
+
+def _say(ax: Axes, title: str, text: str) -> None:
+    """Says in place of a loop why there is none."""
+    style.dress(ax, title, "", "")
+    ax.set_axis_off()
+    look: dict[str, Any] = {"fontsize": style.SMALL + 1, "color": style.GREY, "transform": ax.transAxes}
+    ax.text(0.5, 0.5, text, ha="center", va="center", **look)
 
 
 def draw_momentum(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
