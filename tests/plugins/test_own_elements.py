@@ -168,7 +168,7 @@ def test_the_figure_has_a_panel_for_each_unit_of_what_elements_show(tmp_path):
     panels = [ax for part in make_figure(RunData.from_directory(tmp_path)).subfigs for ax in part.axes]
     own_panels = [ax for ax in panels if "own columns" in ax.get_title("left")]
     shown = {ax.get_ylabel(): ax.get_legend_handles_labels()[1] for ax in own_panels}
-    assert shown == {"(mm/s)": ["speed of element 0"], "": ["ticks of element 0"]}
+    assert shown == {"speed (mm/s)": ["speed of element 0"], "ticks": ["ticks of element 0"]}
 
 
 def test_what_it_shows_must_be_a_field_of_its_memory():

@@ -123,7 +123,7 @@ def parting_words(found: Difference) -> str:
     if found.why_not:
         return found.why_not
     if found.parting is None:
-        return f"Every bit of the {found.ticks} ticks that both logs hold is the same."
+        return f"Every bit that both logs hold is the same; ticks in both: {found.ticks}."
     tick, at_s, column = found.parting.tick, found.parting.at_s, found.parting.column
     what = f"{_COLUMNS[column]} (column {column})" if column in _COLUMNS else f"column {column}"
     return f"They part at tick {tick}, at {at_s:g} s: up to there every bit is the same, then {what} differs first."

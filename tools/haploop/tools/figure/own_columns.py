@@ -40,9 +40,17 @@ def draw_own_columns(body: SubFigure, grid: GridSpec, row: int, run: RunData) ->
         largest = [float(np.nanmax(np.abs(column), initial=0.0)) for column in columns.values()]
         factor, letter = prefix_for(largest) if unit in _PREFIXED else (1.0, "")
         for number, (name, column) in enumerate(columns.items()):
-            index, own = _NAME.fullmatch(name).groups()  # pyright: ignore[reportOptionalMemberAccess]
-            line(ax, run.ticks_s, column / factor, f"{own} of element {index}", style.element_colour(number), held=True)
+            label = "{1} of element {0}".format(*_parts(name))
+            line(ax, run.ticks_s, column / factor, label, style.element_colour(number), held=True)
         ax.set_xlim(*run.span_s)
-        style.dress(ax, "Elements' own columns", "time (s)", f"({letter}{unit})" if unit else "")
+        # One alone is named at its axis, too.
+        own_name = _parts(next(iter(columns)))[1] if len(columns) == 1 else ""
+        label = f"{own_name} ({letter}{unit})".lstrip() if unit else own_name
+        style.dress(ax, "Elements' own columns", "time (s)", label)
         style.legend(ax)
         mark_events([ax], run)
+
+
+def _parts(name: str) -> tuple[str, ...]:
+    """Returns the element's number and the column's own name, of a name such as ``dissipation.0.alpha``."""
+    return _NAME.fullmatch(name).groups()  # pyright: ignore[reportOptionalMemberAccess]

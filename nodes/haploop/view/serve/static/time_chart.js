@@ -76,7 +76,7 @@ export class TimeChart {
     }));
     const options = {
       ...this.size(),
-      padding: [8, 14, 2, 0],
+      padding: [8, 26, 2, 0], // room for half of the last label of the time axis
       legend: { show: false },
       scales: {
         x: { time: false, auto: false, range: (u, min, max) => [min, max] },
