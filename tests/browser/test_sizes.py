@@ -80,6 +80,7 @@ def shown(stand_in, open_page, viewport, scheme, **options):
     stand_in.show(contact())
     page = open_page(stand_in.url, viewport=viewport, color_scheme=scheme, **options)
     stand_in.drawn()
+    expect(page.locator("#verdict span")).to_have_text(RUNNING["sight"]["word"])
     expect(page.locator("#force .legend")).to_contain_text("total")
     still(page)
     return page
@@ -181,6 +182,25 @@ def test_on_a_phone_a_title_is_read_whole_and_a_verdict_with_a_proviso_keeps_its
     expect(page.locator("#seen")).to_have_text("by friction alone, while the hand holds on")
     sign, word = (page.locator(f"#verdict {part}").bounding_box() for part in ("svg", "span"))
     assert 0 < word["x"] - sign["x"] - sign["width"] < 12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("viewport", [DESK, PHONE])
+def test_another_pace_or_span_of_time_moves_nothing(viewport, stand_in, open_page):
+    page = shown(stand_in, open_page, viewport, "light")
+    places = """[...document.querySelectorAll('nav *')].map(e => {
+        const b = e.getBoundingClientRect();
+        return [b.x, b.width];
+    })"""
+    before = page.evaluate(places)
+    for pace in (0.1, "free"):
+        stand_in.state(pace=pace)
+        expect(page.locator(f"[name='pace'][value='{pace}']")).to_be_checked()
+        assert page.evaluate(places) == before
+    for span in ("0.2", "10", "all"):
+        page.locator(f"label:has([name='span'][value='{span}'])").click()
+        expect(page.locator(f"[name='span'][value='{span}']")).to_be_checked()
+        assert page.evaluate(places) == before
 
 
 @pytest.mark.slow
