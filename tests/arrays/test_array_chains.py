@@ -7,16 +7,34 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from haploop.controller.dissipation import registry
 from haploop.launch.batch import batch
-from haploop.launch.batch.stacking import is_batchable, structure
+from haploop.launch.batch import run as batch_run
+from haploop.launch.batch.stacking import device_of, is_batchable, structure
+from haploop.plant.friction import batch as friction_batch
 from haploop.protocol.scene.effects import Accelerometer, Friction, Transmission
 from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.paths import with_value
+from haploop.protocol.scene.scene import Scene
 from helpers.runs.batches import alone, diverging, together, with_stiffness
 from helpers.scenes.effect_tables import EFFECTS, slowly, tap
 from helpers.scenes.varied_scenes import drawn_chain, varied
 
 LINES = {"friction", "jitter", "loss"}
+
+
+def devices_that_rub(effects: tuple[str, ...]) -> list[Scene]:
+    """Five scenes of three devices, the second and the last thrown beyond their limits."""
+    base = tap(("friction", *effects), duration=0.1)
+    of = [(0.05, 300.0), (0.05, 2000.0), (0.07, 300.0), (0.03, 900.0), (0.07, 3000.0)]
+    return [
+        replace(
+            with_stiffness(with_value(base, "device.mass", mass_kg), stiffness_N_m),
+            seed=index,
+            diverged_beyond=1e-3 if index in (1, 4) else 1.0,
+        )
+        for index, (mass_kg, stiffness_N_m) in enumerate(of)
+    ]
 
 
 @pytest.mark.parametrize("seed", [*range(15), *slowly(range(15, 30))])
@@ -99,9 +117,34 @@ def test_loops_with_friction_that_diverge_disturb_no_other(monkeypatch: pytest.M
         assert together(scenes) == expected
 
 
-def test_friction_that_needs_every_step_walked_and_bodies_that_differ_go_alone() -> None:
-    base = tap(("friction",))
-    curved = tap((), friction={"kinetic": 0.04, "breakaway": 0.05, "stribeck_velocity": 0.01})
-    other = with_value(base, "device.mass", 0.06)
-    assert not is_batchable(curved)
-    assert structure(base) != structure(other)
+@pytest.mark.parametrize("effects", [(), ("transmission", "grip"), tuple(set(EFFECTS) - LINES)])
+def test_loops_with_friction_share_an_array_though_their_bodies_differ_and_some_leave(effects: tuple[str, ...]) -> None:
+    scenes = devices_that_rub(effects)
+    assert len({structure(each) for each in scenes}) == 1
+    assert len({device_of(each) for each in scenes}) == 3
+    expected = [alone(each) for each in scenes]
+    assert [result["ended"] for result in expected] == ["done", "diverged", "done", "done", "diverged"]
+    assert all(result["energy"]["friction_heat_J"] > 1e-5 for result in expected)
+    assert together(scenes) == expected
+
+
+def test_a_member_that_were_moved_as_the_device_of_another_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenes = devices_that_rub(())
+    monkeypatch.setattr(friction_batch, "devices_of", lambda chain, members: ([0], np.zeros(members, np.int64)))
+    assert together(scenes) != [alone(each) for each in scenes]
+
+
+def test_a_batch_with_friction_has_no_more_devices_than_are_kept_in_mind(monkeypatch: pytest.MonkeyPatch) -> None:
+    base, made = tap(("friction",), duration=0.02), []
+    scenes = [
+        with_stiffness(with_value(base, "device.mass", 0.05 + 0.01 * (i % 5)), 300.0 + 100.0 * i) for i in range(20)
+    ]
+    monkeypatch.setattr(batch_run, "DEVICES", 2)
+    monkeypatch.setattr(batch_run, "Batch", lambda some, *of, **so: made.append(some) or batch.Batch(some, *of, **so))
+    results = batch_run.run_batch(scenes, registry(), trajectories=True)
+    assert [len({device_of(scene) for scene in some}) for some in made] == [1, 2, 2]
+    assert [one["trajectory_sha256"] for one in results] == [alone(one)["trajectory_sha256"] for one in scenes]
+
+
+def test_friction_that_needs_every_step_walked_goes_alone() -> None:
+    assert not is_batchable(tap((), friction={"kinetic": 0.04, "breakaway": 0.05, "stribeck_velocity": 0.01}))

@@ -78,6 +78,19 @@ def test_so_has_a_batch_whatever_room_there_is_for_the_pieces(
     assert by(0, monkeypatch, scenes) == expected
 
 
+@pytest.mark.parametrize("room", [None, 40])
+def test_so_has_a_batch_of_several_devices(room: int | None, loops: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    base = scene_of("as many states as there can be")
+    scenes = [
+        with_stiffness(with_value(base, "device.mass", mass_kg), k)
+        for mass_kg, k in ((0.05, 60.0), (0.08, 700.0), (0.05, 2900.0), (0.03, 700.0))
+    ]
+    expected = by(np.inf, monkeypatch, scenes)
+    if room:
+        monkeypatch.setattr(loops.loops, "_PIECES", room)
+    assert by(0, monkeypatch, scenes, batch=True) == expected
+
+
 def test_so_have_batches_that_creep_to_rest(loops: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     scenes = [replace(creeping(), friction=Friction(kinetic=kinetic)) for kinetic in (0.043, 0.03)]
     expected = by(np.inf, monkeypatch, scenes)

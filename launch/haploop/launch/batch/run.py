@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Sequence
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from itertools import chain, pairwise
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from haploop.controller.dissipation import ElementError
 from haploop.launch.batch.batch import Batch
-from haploop.launch.batch.stacking import is_batchable, structures
+from haploop.launch.batch.stacking import device_of, is_batchable, structures
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.spec import RunFailed
 from haploop.launch.stability.judge import is_watched, with_verdict
 from haploop.launch.stability.judge_batch import judge_batch
 from haploop.logger.summary import OF_THE_MACHINE, Summary
+from haploop.plant.chain.transition import DEVICES
 from haploop.plant.choose import needs_chain
 from haploop.protocol.scene.scene import Scene
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
 Kinds = dict[str, "type[Element]"]
+T = TypeVar("T")
 # Fewer members of one structure are sooner run one by one; more than so many at once outgrow the cache.
 FEWEST, MOST = 16, 2048
 
@@ -54,7 +56,7 @@ def batch_results(
     """
     alone = set(range(len(scenes)))
     for group in groups(scenes):
-        for chunk in _chunks(group, fewest, most):
+        for chunk in _chunks(scenes, group, fewest, most):
             together = _together([scenes[index] for index in chunk], kinds, energy, trajectories)
             for index, result in zip(chunk, together, strict=True):
                 if result is not None:
@@ -69,21 +71,35 @@ def groups(scenes: Sequence[Scene]) -> list[list[int]]:
     found: dict[Hashable, list[int]] = {}
     fits: dict[Hashable, bool] = {}
     for index, (scene, shape) in enumerate(zip(scenes, structures(scenes), strict=True)):
-        # Of one structure all can be or none, but for chains that differ, whose numbers decide, too.
-        if shape not in fits or (needs_chain(scene) and not scene.friction):
+        # Of one structure all can be or none, but for chains, whose numbers decide, too.
+        if shape not in fits or needs_chain(scene):
             fits[shape] = is_batchable(scene)
         if fits[shape]:
             found.setdefault(shape, []).append(index)
     return list(found.values())
 
 
-def _chunks(group: list[int], fewest: int, most: int) -> list[list[int]]:
-    """The group in as few parts as can be, equally long; none where it is too small."""
+def _chunks(scenes: Sequence[Scene], group: list[int], fewest: int, most: int) -> list[list[int]]:
+    """The group in as few parts as can be, equally long; none where it is too small.
+
+    With friction a part has no more devices than are kept in mind. One that is left alone is none.
+    """
     if len(group) < fewest:
         return []
-    parts = -(-len(group) // most)
-    bounds = [len(group) * part // parts for part in range(parts + 1)]
-    return [group[first:last] for first, last in pairwise(bounds)]
+    some = [group]
+    if scenes[group[0]].friction:
+        by_device: dict[Hashable, list[int]] = {}
+        for index in group:
+            by_device.setdefault(device_of(scenes[index]), []).append(index)
+        some = [[*chain.from_iterable(part)] for part in _parts([*by_device.values()], DEVICES)]
+    return [part for one in some for part in _parts(one, most) if len(part) > 1]
+
+
+def _parts(whole: list[T], most: int) -> list[list[T]]:
+    """A list in as few parts as can be, as good as equally long."""
+    parts = -(-len(whole) // most)
+    bounds = [len(whole) * part // parts for part in range(parts + 1)]
+    return [whole[first:last] for first, last in pairwise(bounds)]
 
 
 def _together(scenes: Sequence[Scene], kinds: Kinds, energy: bool, trajectories: bool) -> Sequence[Summary | None]:

@@ -17,8 +17,8 @@ from haploop.protocol.ticks import DELAY
 # What says nothing of what is simulated.
 _ASIDE = ("title", "seed", "run")
 _TIMES = ("clock", "duration", "at", "delay")
-# Members with friction have the same bodies; the hand may press, and friction measure, as it likes.
-_PRESSES = "force"
+# The device and what it is joined to; how it moves and is pressed is no part of it.
+_MOVES = ("position", "velocity", "rest", "force")
 _BODIES = ("device", "hand", "transmission", "actuator", "accelerometer")
 
 
@@ -39,9 +39,14 @@ def structure(scene: Scene) -> Hashable:
     """Returns what scenes that are stacked must have in common: all but the values of their numbers.
 
     Times are common, too: the clock, the duration, delays, when events come, the points of a recorded force. So is
-    whether a number is 0, which may mean that something is not there, and where there is friction all bodies.
+    whether a number is 0, which may mean that something is not there.
     """
     return next(structures([scene]))
+
+
+def device_of(scene: Scene) -> Hashable:
+    """Returns the numbers of a scene's bodies: scenes in which these are the same share what is made of them."""
+    return tuple(_structure(vars(scene)[key], True) for key in _BODIES)
 
 
 def structures(scenes: Iterable[Scene]) -> Iterator[Hashable]:
@@ -50,12 +55,9 @@ def structures(scenes: Iterable[Scene]) -> Iterator[Hashable]:
     parts: dict[str, Hashable] = {}
     for scene in scenes:
         entries = vars(scene)
-        by_value = _TIMES + _BODIES if scene.friction else _TIMES
-        if scene.friction or before.get("friction"):
-            before = {}
         for key, value in entries.items():
             if before.get(key, _ASIDE) is not value and key not in _ASIDE:
-                parts[key] = _structure(value, key in by_value)
+                parts[key] = _structure(value, key in _TIMES)
         before = entries
         yield tuple(parts.values())
 
@@ -66,7 +68,8 @@ def _structure(value: Any, by_value: bool) -> Hashable:
     if isinstance(value, Table | dict):
         entries = value if isinstance(value, dict) else vars(value)
         parts = [
-            (key, _structure(entry, (by_value and key != _PRESSES) or key in _TIMES)) for key, entry in entries.items()
+            (key, _structure(entry, (by_value and key not in _MOVES) or key in _TIMES))
+            for key, entry in entries.items()
         ]
         return value.__class__, *parts
     if isinstance(value, tuple | list):

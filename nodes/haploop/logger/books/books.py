@@ -33,11 +33,12 @@ from haploop.protocol.walls.registry import class_of
 
 if TYPE_CHECKING:
     from haploop.logger.books.buffers import Commanded
+    from haploop.logger.books.by_device import BooksByDevice
     from haploop.logger.books.chain import ChainBooks
     from haploop.logger.books.closing import ClosingBooks
     from haploop.protocol.walls.wall import Wall
 
-    PlantBooks = OneMassBooks | ChainBooks | ClosingBooks
+    PlantBooks = OneMassBooks | ChainBooks | BooksByDevice | ClosingBooks
 
 
 class Books:
@@ -196,6 +197,10 @@ def plant_books(scene: Scene, time: Timebase, members: int | None = None) -> Pla
     lags = scene.actuator is not None and scene.actuator.bandwidth is not None
     grips = scene.hand is not None and scene.hand.grip is not None
     if lags or grips or scene.friction or scene.transmission:
+        if members is not None and scene.friction:
+            from haploop.logger.books.by_device import books_of_batch
+
+            return books_of_batch(scene, time, members)
         from haploop.logger.books.chain import ChainBooks
 
         return ChainBooks(scene, time, members)

@@ -20,15 +20,17 @@ Made = TypeVar("Made")
 _wide = np.longdouble
 # Responses to the load are made for this many intervals at a time, on a fixed grid; in a batch for fewer.
 PIECE_TICKS, _PIECE_TICKS_OF_A_BATCH = 256, 8
+# Devices of which a process keeps what takes long to make, twice half a megabyte each with friction.
+DEVICES = 64
 
 
 def of_device(make: Callable[..., Made]) -> Callable[..., Made]:
-    """Returns ``make``, from a chain of floats and what else it needs, that keeps what it made of the last 64 of them.
+    """Returns ``make``, from a chain of floats and what else it needs, that keeps what it made of the last of them.
 
     It may not look at the start and the rest: chains that differ in these alone share it.
     """
-    kept = lru_cache(maxsize=64)(make)
-    return lambda chain, *of: kept(replace(chain, spring=(chain.spring[0], 0.0), start=(0.0, 0.0)), *of)
+    kept = lru_cache(maxsize=2 * DEVICES)(make)  # of each device with its first body free, and held
+    return lambda chain, *of: kept(_of_any_start(chain), *of)
 
 
 class ChainTransition:
@@ -178,6 +180,22 @@ class ChainIntegrals:
         return (increment[:, n, :n] / 2.0 - later) * self._scales
 
 
+def devices_of(chain: Chain, members: int) -> tuple[list[int], np.ndarray]:
+    """Returns one member of each device of a batch, and which of these devices every member has, shape (members,).
+
+    Chains that differ in the start and the rest alone are of one device.
+    """
+    numbers = [leaf for leaf in tree_leaves(_of_any_start(chain)) if getattr(leaf, "shape", ())]
+    rows = list(zip(*(np.broadcast_to(number, members).tolist() for number in numbers), strict=True))
+    first = {row: place for place, row in reversed([*enumerate(rows)])} if rows else {(): 0}
+    device = {row: which for which, row in enumerate(first)}
+    return [*first.values()], np.array([device[row] for row in rows or [()] * members])
+
+
+def _of_any_start(chain: Chain) -> Chain:
+    return replace(chain, spring=(chain.spring[0], 0.0), start=(0.0, 0.0))
+
+
 def make_tables(
     make: Callable[[Chain], tuple[np.ndarray, ...]], chain: Chain, *, has_members: bool = True
 ) -> tuple[np.ndarray, ...]:
@@ -189,7 +207,7 @@ def make_tables(
     """
 
     # What is made does not depend on the start and the rest: chains that differ in these alone share it.
-    chain = replace(chain, spring=(chain.spring[0], 0.0), start=(0.0, 0.0))
+    chain = _of_any_start(chain)
     leaves = tree_leaves(chain)
     tables = each(lambda *numbers: make(tree_unflatten(chain, numbers)), *leaves)
     is_shared = not any(getattr(leaf, "shape", ()) for leaf in leaves)

@@ -1,4 +1,4 @@
-"""The motion of many chains of one device whose first body sticks and slips."""
+"""The motion of many chains whose first bodies stick and slip."""
 
 from __future__ import annotations
 
@@ -6,38 +6,56 @@ from typing import Any
 
 import numpy as np
 
+from haploop.plant.chain.chain import Chain
 from haploop.plant.chain.history import ChainState, Interval, StickSlipState
 from haploop.plant.chain.motion import ChainMotion, follow
-from haploop.plant.friction.motion import FrictionMotion
+from haploop.plant.chain.transition import devices_of
+from haploop.plant.friction.motion import FrictionMotion, holds_in_steps, loops_for
 from haploop.plant.friction.stick_slip import RubbingHistory, StickSlip, holds_against, row_on, slipping
 from haploop.plant.friction.substeps import pieces_record
 from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
-from haploop.protocol.trees import tree_member, tree_select, tree_take
+from haploop.protocol.trees import tree_map, tree_member, tree_select, tree_take
 
 
 class BatchFrictionMotion(RubbingHistory, ChainMotion):
-    """``FrictionMotion`` of the members of a batch with the same chain; loads and what friction measures may differ.
+    """``FrictionMotion`` of the members of a batch, whose numbers may all differ.
 
     In an interval all members go as far as they would if nothing switched, those that stick and those that slip apart.
     Most do. For each of the others the interval is solved anew by the motion of one run.
     """
 
     def __init__(self, scene: Scene, time: Timebase, members: int) -> None:
-        self._one = FrictionMotion(tree_member(scene, 0), time)
+        places, self._device = devices_of(Chain.from_scene(scene), members)
+        self._devices = [FrictionMotion(tree_member(scene, place), time, by_loop=False) for place in places]
         self._pieces: list[tuple[np.ndarray, np.ndarray]] = []
         super().__init__(scene, time, members)
-        self._stick_slip = StickSlip.of(self.chain, self.friction, self._step_s)
+        self.stick_slip = self._of_each([one.stick_slip for one in self._devices])._replace(law=self.friction)
         self._clamped = self._response(stuck=True)
-        self._loops = self._one.loops_for(time.ticks * members)
+        self._loops = loops_for(self._devices, time.ticks * members)
+
+    def _of_each(self, of_devices: list[StickSlip]) -> StickSlip:
+        """Returns the numbers of every member; ArithmeticError where a force has other terms in some devices."""
+
+        def of_each(*numbers: Any) -> Any:
+            return numbers[0] if len(set(numbers)) == 1 else np.array(numbers)[self._device]
+
+        if len({tuple(i for row in (of.force, of.change) for i, _ in row.of_states) for of in of_devices}) > 1:
+            raise ArithmeticError("Devices on whose first bodies other states act cannot be moved together.")
+        return tree_map(of_each, *of_devices)
+
+    def _device_of(self, place: int) -> FrictionMotion:
+        """Returns the motion of one member's device, with its law of friction."""
+        one = self._devices[self._device[place]]
+        one.rub_by(tree_member(self.friction, place))
+        return one
 
     def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
         loads = np.broadcast_to(self.loads(0, 1)[0], z.shape[1:]).tolist()
         begun = []
         for place, (start, load) in enumerate(zip(z.T, loads, strict=True)):
-            self._one.rub_by(tree_member(self.friction, place))
-            begun.append(self._one.begun_under(start, load))
+            begun.append(self._device_of(place).begun_under(start, load))
         held, modes = zip(*begun, strict=True)
         return np.stack(held, axis=-1), StickSlipState(*map(np.array, zip(*modes, strict=True)))
 
@@ -47,7 +65,9 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         if self._loops and (mode := self.state.mode):
             modes = np.stack([mode.is_stuck, mode.direction])
             laws = np.stack(np.broadcast_arrays(*(np.atleast_1d(number) for number in self.friction)))
-            found = self._loops.advance(interval.course, forced, loads, holds, tick * self._n, modes, laws)
+            found = self._loops.advance(
+                interval.course, forced, loads, holds, tick * self._n, modes, laws, self._device
+            )
             if found is not None:
                 self._pieces += found
                 return self._accept(tick, interval, StickSlipState(modes[0] > 0.0, modes[1]))
@@ -68,7 +88,7 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         """Returns the modes at the beginning; see ``decide_at_rest``."""
         z, mode = interval.states[0], self.state.mode
         assert mode
-        force, is_at_rest = row_on(self._stick_slip.force, z, interval.held[0, 0], loads[0]), z[self._v] == 0.0
+        force, is_at_rest = row_on(self.stick_slip.force, z, interval.held[0, 0], loads[0]), z[self._v] == 0.0
         is_stuck = np.where(is_at_rest, holds_against(self.friction, force), mode.is_stuck)
         return is_stuck, np.where(is_at_rest, np.copysign(1.0, force), mode.direction)
 
@@ -78,20 +98,20 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
     ) -> np.ndarray:  # fmt: skip
         """Lets some members, of which all stick or all slip, follow their mode; returns which of them it holds for."""
         some = Interval.of(np.ascontiguousarray(interval.course[..., places]), len(self.state.z))
-        friction = slipping(self._one.rub_by(tree_take(self.friction, places)), mode)
-        follow((self._clamped if mode.is_stuck else self._free).held, forced, some, 0, holds, friction)
+        of, held = tree_take((self.stick_slip, (self._clamped if mode.is_stuck else self._free).held), places)
+        friction = slipping(of, mode)
+        follow(held, forced, some, 0, holds, friction)
         some.held[:, 2], some.held[:, 3] = friction, mode.is_stuck
         some.at_ends[:, 0], some.at_ends[:, 1] = friction, mode.is_stuck
         interval.course[..., places] = some.course
-        return np.all(self._one.holds_in_steps(mode, some, 0, friction, loads), axis=0)
+        return np.all(holds_in_steps(of, mode, some, 0, friction, loads), axis=0)
 
     def _solve(
         self, interval: Interval, place: int, tick: int, holds: list[Hold], loads: np.ndarray,
         forced: tuple[np.ndarray, np.ndarray],
     ) -> StickSlipState:  # fmt: skip
         """Takes one member through the interval alone; returns its mode at the end."""
-        one, state = self._one, self.state
-        one.rub_by(tree_member(self.friction, place))
+        one, state = self._device_of(place), self.state
         held, mode = one.state.held, tree_member(state.mode, place)
         one.state = ChainState(state.z[:, place].copy(), state.z_comp[:, place].copy(), held, one.state.sensed, mode)
         one.advance_under(loads, forced, tick, holds)
@@ -123,4 +143,5 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
     def select(self, kept: np.ndarray) -> None:
         super().select(kept)
         self._clamped.select(kept)
-        self.friction = tree_select(self.friction, kept)
+        self._device = self._device[kept]
+        self.friction, self.stick_slip = tree_select((self.friction, self.stick_slip), kept)

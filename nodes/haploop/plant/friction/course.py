@@ -20,7 +20,7 @@ _code = MachineCode(__file__, (motion, step_loop, stick_slip, substeps, loops))
 
 @_code.compiled
 def _advance(
-    mass_kg, speed_up, rows, whole, tables, held, law, pieces, course, forced, loads, modes, holds, ends, room, count,
+    whole, mass_kg, speed_up, rows, tables, held, law, pieces, course, forced, loads, modes, holds, ends, room, count,
     row, at, first_step,
 ):  # pragma: no cover  # fmt: skip
     """Moves through an interval; returns x at its end, m, and whether there was room for its pieces."""
@@ -32,11 +32,11 @@ def _advance(
         for step in range(begin, end):
             some[step, 2 * size], some[step, 2 * size + 1] = holds[i, 1], holds[i, 2]
     rubs = stick_slip.Friction(law[0], law[1], law[2], law[3])
-    of = StickSlip(rubs, whole[0], mass_kg, speed_up, row_of(rows, 0), row_of(rows, 1))
+    of = StickSlip(rubs, whole[0], mass_kg[0], speed_up[0], row_of(rows[0], 0), row_of(rows[0], 1))
     mode = walk(
-        of, substeps.Halving(whole[1], whole[2]), whole[3] > 0, tables, held, forced[at], some,
-        loads[at * n : (at + 1) * n + 1], ends[:count], first_step, StickSlipState(modes[0] > 0.0, modes[1]), pieces,
-        room,
+        of, substeps.Halving(whole[1], whole[2]), whole[3] > 0, (tables[0][0], tables[1][0]), held[0], forced[at],
+        some, loads[at * n : (at + 1) * n + 1], ends[:count], first_step,
+        StickSlipState(modes[0] > 0.0, modes[1]), pieces, room,
     )  # fmt: skip
     if pieces[-1, 0] >= len(pieces):
         pieces[-1, 0] = before
@@ -55,7 +55,7 @@ class Course:
     def __init__(self, of: Loops, law: Friction, steps: int) -> None:
         self._of, self._n, self._size = of, steps, of.states
         self._modes, self._holds, self._ends = np.zeros(2), np.empty((steps, 3)), np.empty(steps, np.int64)
-        self._system = *of.system, np.array(law), of.pieces
+        self._system = of.cut, *of.devices, np.array(law), of.pieces
         self._array = np.empty((0, 0))
         self.row, self._taken = -1, 0
 

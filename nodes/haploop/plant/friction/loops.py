@@ -5,6 +5,8 @@ The formulas are those of ``stick_slip`` and ``substeps`` as they stand; so are 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from haploop.plant.chain import motion
@@ -123,12 +125,11 @@ def row_of(rows, at):  # pragma: no cover
 
 @_code.compiled
 def _advance(
-    mass_kg, speed_up, rows, whole, tables, held, laws, free, clamped, loads, ends, first_step, courses, modes, pieces,
-    upto, member,
+    whole, mass_kg, speed_up, rows, tables, held, devices, laws, free, clamped, loads, ends, first_step, courses, modes,
+    pieces, upto, member,
 ):  # pragma: no cover  # fmt: skip
     """Moves members through an interval, from one on; returns the first one whose pieces there is no room for."""
     members, n, size = courses.shape[2], courses.shape[0] - 1, free.shape[1]
-    force, change = row_of(rows, 0), row_of(rows, 1)
     halving, room = substeps.Halving(whole[1], whole[2]), np.empty((5, ACTS))
     some, load = np.empty((_TOGETHER, n + 1, 2 * size + 6)), np.empty((_TOGETHER, n + 1))
     forced = np.empty((2, n + 1, size))
@@ -146,16 +147,17 @@ def _advance(
             if free.shape[2] > 1 or not at:
                 place = min(m, free.shape[2] - 1)
                 forced[0], forced[1] = free[:, :, place], clamped[:, :, place]
-            law = min(m, laws.shape[1] - 1)
+            law, device = min(m, laws.shape[1] - 1), devices[m]
             rubs = stick_slip.Friction(laws[0, law], laws[1, law], laws[2, law], laws[3, law])
-            of = StickSlip(rubs, whole[0], mass_kg, speed_up, force, change)
+            force, change = row_of(rows[device], 0), row_of(rows[device], 1)
+            of = StickSlip(rubs, whole[0], mass_kg[device], speed_up[device], force, change)
             mode = StickSlipState(modes[0, m] > 0.0, modes[1, m])
             mode = walk(
                 of,
                 halving,
                 whole[3] > 0,
-                tables,
-                held,
+                (tables[0][device], tables[1][device]),
+                held[device],
                 forced,
                 some[at],
                 load[at],
@@ -181,38 +183,46 @@ def _advance(
 
 
 class Loops:
-    """Intervals of one chain, or of a batch that shares it; the law of friction is handed in.
+    """Intervals of chains of some devices, as many states each; the law of friction is handed in.
 
     Args:
-        tables: transitions over h / 2^level by whether body 0 is stuck and by level, (2, levels, states + 4, states).
-        held: over 1 ... n steps by whether it is stuck, (2, states + 2, n, states).
+        of: of each device.
+        halving, whole_steps: how plant steps are cut, and whether one in which nothing switches is not.
+        tables: transitions over h / 2^level by device, by whether body 0 is stuck and by level, shape (devices, 2,
+            levels, states + 4, states).
+        held: over 1 ... n steps by device and whether it is stuck, shape (devices, 2, states + 2, n, states).
 
     Attributes:
-        system: what the loops need of the chain.
+        cut: as the loops need it, with the place of the velocity of body 0 among the states.
+        devices: what the loops need of each; arrays, devices first.
         states: their number.
         pieces, room: for pieces, whose number stands in a last row, and for states on the way.
     """
 
     def __init__(
-        self, of: StickSlip, halving: substeps.Halving, whole_steps: bool, tables: np.ndarray, held: np.ndarray
-    ) -> None:
-        rows = np.zeros((2, STATES + 2))
+        self, of: Sequence[StickSlip], halving: substeps.Halving, whole_steps: bool, tables: np.ndarray,
+        held: np.ndarray,
+    ) -> None:  # fmt: skip
+        rows = np.zeros((len(of), 2, STATES + 2))
         assert tables.shape[-1] <= STATES
-        for row, (of_states, *others) in zip(rows, (of.force, of.change), strict=True):
-            row[-2:] = others
-            for i, factor in of_states:
-                row[i] = factor
-        filled = [(0, 0)] * 3 + [(0, STATES - tables.shape[-1])]
-        both = np.pad(tables, filled), np.ascontiguousarray(tables.swapaxes(2, 3))
-        held = np.ascontiguousarray(np.pad(held, filled).swapaxes(1, 2))
-        self.system = of.mass_kg, of.speed_up, rows, np.array([of.v, *halving, whole_steps]), both, held
+        for of_device, one in zip(rows, of, strict=True):
+            for row, (of_states, *others) in zip(of_device, (one.force, one.change), strict=True):
+                row[-2:] = others
+                for i, factor in of_states:
+                    row[i] = factor
+        filled = [(0, 0)] * 4 + [(0, STATES - tables.shape[-1])]
+        both = np.pad(tables, filled), np.ascontiguousarray(tables.swapaxes(3, 4))
+        held = np.ascontiguousarray(np.pad(held, filled).swapaxes(2, 3))
+        masses_kg, speeds_up = np.array([[one.mass_kg, one.speed_up] for one in of]).T.copy()
+        self.cut = np.array([of[0].v, *halving, whole_steps])
+        self.devices = masses_kg, speeds_up, rows, both, held
         self.states = tables.shape[-1]
-        self.pieces = np.zeros((_PIECES + 1, 6 + self.states + of.v))
+        self.pieces = np.zeros((_PIECES + 1, 6 + self.states + of[0].v))
         self.room = np.empty((5, ACTS))
 
     def advance(
         self, course: np.ndarray, forced: tuple[np.ndarray, np.ndarray], loads: np.ndarray, holds: list[Hold],
-        first_step: int, modes: np.ndarray, laws: np.ndarray,
+        first_step: int, modes: np.ndarray, laws: np.ndarray, devices: np.ndarray,
     ) -> list[Pieces] | None:  # fmt: skip
         """Moves all members through an interval, whose first plant step is numbered; changes their modes in place.
 
@@ -223,6 +233,7 @@ class Loops:
             loads: shape (n + 1, 1 or members), N.
             modes: whether body 0 sticks, and its direction, shape (2, members).
             laws: the numbers of ``Friction``, shape (4, 1 or members).
+            devices: the place of each member's among the devices, shape (members,).
 
         Returns:
             Their pieces, member after member; None where one switches too often for the loops: the interval is then to
@@ -233,7 +244,10 @@ class Loops:
         upto = np.empty(members, np.int64)
         while begun < members:
             pieces[-1, 0] = 0.0
-            member = _advance(*self.system, laws, *forced, loads, ends, first_step, course, modes, pieces, upto, begun)
+            member = _advance(
+                self.cut, *self.devices, devices, laws, *forced, loads, ends, first_step, course, modes, pieces, upto,
+                begun,
+            )  # fmt: skip
             if member == begun:
                 return None
             if count := int(pieces[-1, 0]):
@@ -257,10 +271,11 @@ def smallest() -> Loops:
     """Returns the loops of a chain of one body with one plant step a tick, that does not move."""
     row = Row([], 1.0, 1.0)
     of = StickSlip(stick_slip.Friction(1.0, 1.0, 0.0, 1.0), 1, 1.0, 1.0, row, row)
-    return Loops(of, substeps.Halving(0, 1), True, np.zeros((2, 3, 6, 2)), np.zeros((2, 4, 1, 2)))
+    return Loops([of], substeps.Halving(0, 1), True, np.zeros((1, 2, 3, 6, 2)), np.zeros((1, 2, 4, 1, 2)))
 
 
 def _try_out() -> None:
     forced = np.zeros((2, 2, 1)), np.zeros((2, 2, 1))
     course, hold = np.zeros((2, 10, 1)), (1, 0.0, 0)
-    smallest().advance(course, forced, np.zeros((2, 1)), [hold], 0, np.ones((2, 1)), np.ones((4, 1)))
+    modes, laws, devices = np.ones((2, 1)), np.ones((4, 1)), np.zeros(1, np.int64)
+    smallest().advance(course, forced, np.zeros((2, 1)), [hold], 0, modes, laws, devices)

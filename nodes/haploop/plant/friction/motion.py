@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,15 +51,15 @@ class FrictionMotion(RubbingHistory, ChainMotion):
 
     _course: Course | None = None
 
-    def __init__(self, scene: Scene, time: Timebase) -> None:
+    def __init__(self, scene: Scene, time: Timebase, *, by_loop: bool = True) -> None:
         super().__init__(scene, time)
         self._clamped = self._response(stuck=True)
         self._pieces: list[Any] = []
         self._piece = -1
-        self._halving, self._whole_steps = halving_of(self.chain, self._step_s), goes_by_whole_steps(scene)
-        levels = self._halving.finest + 1
+        self.halving, self.goes_by_whole_steps = halving_of(self.chain, self._step_s), goes_by_whole_steps(scene)
+        levels = self.halving.finest + 1
         self._tables = [halves_of(self.chain, self._step_s, levels, stuck) for stuck in (False, True)]
-        if loops := self.loops_for(time.ticks):
+        if by_loop and (loops := loops_for([self], time.ticks)):
             self._course = LOOPS.module().Course(loops, self.friction, self._n)
 
     @property
@@ -87,17 +88,13 @@ class FrictionMotion(RubbingHistory, ChainMotion):
     def acceleration(self, _tick: int) -> Any:
         return self._sensed[0] if self._sensed else 0.0
 
-    def rub_by(self, law: Friction) -> StickSlip:
-        """Goes on by another law: of one member of a batch, or of some, for what is asked of them next."""
-        self._stick_slip = self._stick_slip._replace(law=law)
-        return self._stick_slip
+    def rub_by(self, law: Friction) -> None:
+        """Goes on by another law: that of one member of a batch, for what is asked of it next."""
+        self.stick_slip = self.stick_slip._replace(law=law)
 
-    def loops_for(self, intervals: int) -> Loops | None:
-        """Returns loops of machine code where they pay for so many intervals; they serve a batch of this chain, too."""
-        if not (module := LOOPS.module_for(intervals)):
-            return None
-        held = np.stack([of.held for of in (self._free, self._clamped)])
-        return module.Loops(self._stick_slip, self._halving, self._whole_steps, np.stack(self._tables), held)
+    def tables(self) -> tuple[np.ndarray, np.ndarray]:
+        """Returns the transitions over h / 2^level, and those over 1 ... n steps, by whether body 0 is stuck."""
+        return np.stack(self._tables), np.stack([of.held for of in (self._free, self._clamped)])
 
     def advance(self, tick: int, holds: list[Hold]) -> Any:
         if self._course and (x := self._by_loop(self._course, tick, holds)) is not None:
@@ -114,10 +111,8 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         step = 0
         assert mode
         while step < self._n:
-            if self._whole_steps:
-                mode = decide_at_rest(
-                    self._stick_slip, mode, interval.states[step], interval.held[step, 0], loads[step]
-                )
+            if self.goes_by_whole_steps:
+                mode = decide_at_rest(self.stick_slip, mode, interval.states[step], interval.held[step, 0], loads[step])
                 step = self._follow(mode, interval, step, holds, loads, forced[mode.is_stuck])
             if step < self._n:
                 mode = self._solve(mode, interval, step, tick, loads)
@@ -147,24 +142,11 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         forced: np.ndarray,
     ) -> int:  # fmt: skip
         """Follows a mode from step ``begin`` on; returns the first step in which it does not hold."""
-        friction = slipping(self._stick_slip, mode)
+        friction = slipping(self.stick_slip, mode)
         follow((self._clamped if mode.is_stuck else self._free).held, forced, interval, begin, holds, friction)
         interval.held[begin:, 2:] = interval.at_ends[begin:] = friction, mode.is_stuck
-        lasts = self.holds_in_steps(mode, interval, begin, friction, loads)
+        lasts = holds_in_steps(self.stick_slip, mode, interval, begin, friction, loads)
         return self._n if lasts.all() else begin + int(lasts.argmin())
-
-    def holds_in_steps(
-        self, mode: StickSlipState, interval: Interval, begin: int, friction: Any, loads: np.ndarray
-    ) -> np.ndarray:
-        """Tells whether a mode holds throughout each step from ``begin`` on; in a batch on the last axis."""
-        of, states, command = self._stick_slip, interval.states.swapaxes(0, 1), interval.held[begin:, 0]
-        starts, ends, load, end_load = states[:, begin:-1], states[:, begin + 1 :], loads[begin:-1], loads[begin + 1 :]
-        holds = holds_through(of, mode, ends, command, end_load)
-        if mode.is_stuck:
-            holds &= holds_through(of, mode, starts, command, load)
-        elif (slow := creeps(of, mode, ends[of.v])).any():
-            holds &= ~(slow & holds_against(of.law, row_on(of.force, ends, command, end_load)))
-        return holds & ~may_switch_within(of, mode, starts, ends, command, load, end_load, friction, 1.0)
 
     def _solve(
         self, mode: StickSlipState, interval: Interval, step: int, tick: int, loads: np.ndarray
@@ -175,11 +157,11 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         number, command = tick * self._n + step, float(held[step, 0])
         z, z_comp, *room = np.stack([states[step], comps[step]] * 2)
         mode, held[step, 2], held[step, 3] = solve_step(
-            self._stick_slip, self._halving, self._tables, mode, number, z, z_comp, command, load, rise, self._pieces,
+            self.stick_slip, self.halving, self._tables, mode, number, z, z_comp, command, load, rise, self._pieces,
             *room,
         )  # fmt: skip
         states[step + 1], comps[step + 1] = z, z_comp
-        at_ends[step] = slipping_at(self._stick_slip, mode, states[step + 1, self._v]), mode.is_stuck
+        at_ends[step] = slipping_at(self.stick_slip, mode, states[step + 1, self._v]), mode.is_stuck
         return mode
 
     def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, np.ndarray]:
@@ -201,3 +183,26 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         self._hand_over()
         super().forget_record()
         self._pieces = []
+
+
+def holds_in_steps(
+    of: StickSlip, mode: StickSlipState, interval: Interval, begin: int, friction: Any, loads: np.ndarray
+) -> np.ndarray:
+    """Tells whether a mode holds throughout each step from ``begin`` on; in a batch on the last axis."""
+    states, command = interval.states.swapaxes(0, 1), interval.held[begin:, 0]
+    starts, ends, load, end_load = states[:, begin:-1], states[:, begin + 1 :], loads[begin:-1], loads[begin + 1 :]
+    holds = holds_through(of, mode, ends, command, end_load)
+    if mode.is_stuck:
+        holds &= holds_through(of, mode, starts, command, load)
+    elif (slow := creeps(of, mode, ends[of.v])).any():
+        holds &= ~(slow & holds_against(of.law, row_on(of.force, ends, command, end_load)))
+    return holds & ~may_switch_within(of, mode, starts, ends, command, load, end_load, friction, 1.0)
+
+
+def loops_for(devices: Sequence[FrictionMotion], intervals: int) -> Loops | None:
+    """Returns loops of machine code that move chains of some devices, where they pay for so many intervals."""
+    if not (module := LOOPS.module_for(intervals)):
+        return None
+    one, (tables, held) = devices[0], map(np.stack, zip(*(device.tables() for device in devices), strict=True))
+    of = [device.stick_slip for device in devices]
+    return module.Loops(of, one.halving, one.goes_by_whole_steps, tables, held)

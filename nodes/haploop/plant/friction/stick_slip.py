@@ -190,12 +190,12 @@ class RubbingHistory(ChainHistory):
         super().__init__(scene, time, *members)
 
     def _begun(self, z: np.ndarray) -> tuple[np.ndarray, StickSlipState | None]:
-        self._stick_slip = StickSlip.of(self.chain, self.friction, self._step_s)
+        self.stick_slip = StickSlip.of(self.chain, self.friction, self._step_s)
         return self.begun_under(z, float(self.loads(0, 1)[0]))
 
     def begun_under(self, z: np.ndarray, load: float) -> tuple[np.ndarray, StickSlipState]:
         """Returns (what is held at the start of one run in state z, shape (states,), under a load in N; the mode)."""
         begun = StickSlipState(False, math.copysign(1.0, z[self._v]))
-        mode = decide_at_rest(self._stick_slip, begun, z, 0.0, load)
-        friction = slipping_at(self._stick_slip, mode, z[self._v])
+        mode = decide_at_rest(self.stick_slip, begun, z, 0.0, load)
+        friction = slipping_at(self.stick_slip, mode, z[self._v])
         return np.array([0.0, -1.0, friction, float(mode.is_stuck)]), mode

@@ -57,7 +57,7 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         forces = _Forces(float(interval.held[first, 0]), load, slope, first * self._step_s)
         z, t = interval.states[first].copy(), forces.start
         interval.held[first:last, 2:] = 0.0, 1.0
-        self._mode = decide_at_rest(self._stick_slip, self._mode, z, forces.command, load)
+        self._mode = decide_at_rest(self.stick_slip, self._mode, z, forces.command, load)
         for _ in range(_MOST_SWITCHES):
             begun = t
             z, t, has_ceased = self._piece(interval, z, t, last, forces)
@@ -68,7 +68,7 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
                 break
         else:
             raise ArithmeticError(f"Friction switched {_MOST_SWITCHES} times in a plant step; raise clock.plant_rate.")
-        friction = slipping_at(self._stick_slip, self._mode, z[v])
+        friction = slipping_at(self.stick_slip, self._mode, z[v])
         interval.states[last], interval.at_ends[last - 1] = z, (friction, self._mode.is_stuck)
 
     def _after_switch(self, z: np.ndarray, t: float, forces: _Forces, moved: bool) -> StickSlipState:
@@ -77,7 +77,7 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         if mode.is_stuck:
             return StickSlipState(False, math.copysign(1.0, self._other_forces(t, z, forces)))
         if moved:
-            return decide_at_rest(self._stick_slip, mode, z, forces.command, forces.load_at(t))
+            return decide_at_rest(self.stick_slip, mode, z, forces.command, forces.load_at(t))
         return StickSlipState(True, mode.direction)
 
     def _piece(
@@ -93,7 +93,7 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         reached = steps[: states.shape[1]]
         interval.states[reached] = states.T
         for step, v in zip(reached.tolist(), states[self._v].tolist(), strict=True):
-            interval.at_ends[step - 1] = slipping_at(self._stick_slip, mode, v), mode.is_stuck
+            interval.at_ends[step - 1] = slipping_at(self.stick_slip, mode, v), mode.is_stuck
         has_ceased = found.status == 1
         end = float(found.t_events[0][0]) if has_ceased else last * h
         if not mode.is_stuck:
