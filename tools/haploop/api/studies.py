@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from haploop.tools.sweep.table import SweepTable
 
 Plugins = Iterable[str | Path]
-# Numbers of an element, each an SI number or text with its unit.
-Amounts = Iterable[float | str]
+# Numbers of an element, each an SI number or text with its unit; one may stand by itself.
+Amount = float | str
+Amounts = Amount | Iterable[Amount]
 
 
 def sweep(
@@ -150,8 +151,8 @@ def dissipate(
 
     Args:
         recording: CSV or TSV, directory of a run, or its log.
-        damping: of virtual damping, N s/m or text with a unit.
-        mass: of bi- and unidirectional inertia, kg or text.
+        damping: of virtual damping, N s/m or text with a unit; one or several.
+        mass: of bi- and unidirectional inertia, kg or text; likewise.
         elements: any other, ``"KIND KEY=VALUE ..."``.
         wall: where a wall begins, m or text: elements act beyond it only, ``occupies`` says on which side.
         delay_s: age of a force as it acts; that of the run when None.
@@ -169,31 +170,37 @@ def dissipate(
     from haploop.tools.dissipate.command import Request, Selection, compute_outcome
     from haploop.tools.dissipate.text_recording import Layout
 
-    dampings, masses = ([str(plain(each)) for each in amounts] for amounts in (damping, mass))
+    dampings, masses = _texts(damping), _texts(mass)
     place = None if wall is None else str(plain(wall))
     selection = Selection(dampings, masses, list(elements), place, occupies, list(values))
     request = Request(Path(recording), selection, Layout(**columns), delay_s)
     return compute_outcome(request, registry([Path(plugin) for plugin in plugins]))
 
 
-def plot(what: Result | str | Path, target: str | Path | None = None) -> Path:
-    """Draws a run that has a directory, or the map of a sweep; returns the figure's file.
+def _texts(amounts: Amounts) -> list[str]:
+    values = plain(amounts if hasattr(amounts, "units") or isinstance(amounts, str | float | int) else list(amounts))
+    return [str(value) for value in (values if isinstance(values, list) else [values])]
+
+
+def plot(what: Result | str | Path | Sequence[Result | str | Path], target: str | Path | None = None) -> Path:
+    """Draws a run that has a directory, several over one another, or the map of a sweep; returns the figure's file.
 
     Args:
-        what: a result, or the directory of a run or a sweep.
+        what: a result, or the directory of a run or a sweep; a list of runs.
         target: file of the figure, in the format of its suffix; ``figure.png`` in the directory when None.
 
     Raises:
-        ValueError: the run was kept in memory alone.
+        ValueError: a run was kept in memory alone.
         FigureError: there is nothing to draw, or matplotlib is not installed.
     """
-    from haploop.tools.figure.run_figure import draw
-    from haploop.tools.sweep.map.figure import draw_map
-    from haploop.tools.sweep.table import is_sweep
+    from haploop.tools.figure.command import draw_any
 
-    directory = what.directory if isinstance(what, Result) else Path(what)
-    if directory is None:
-        raise ValueError(
-            "This run was kept in memory alone; give it a directory to be drawn from: run(scene, out=...)."
-        )
-    return (draw_map if is_sweep(directory) else draw)(directory, None if target is None else Path(target))
+    directories = []
+    for one in [what] if isinstance(what, Result | str | Path) else what:
+        directory = one.directory if isinstance(one, Result) else Path(one)
+        if directory is None:
+            raise ValueError(
+                "This run was kept in memory alone; give it a directory to be drawn from: run(scene, out=...)."
+            )
+        directories.append(directory)
+    return draw_any(directories, None if target is None else Path(target))

@@ -27,7 +27,7 @@ class LoadedScene:
     """A scene that can be run; every change gives a new one, which can be run too, and leaves this one as it is.
 
     A value is a number in SI units, text with its unit (``"0.2 N/mm"``) or a quantity of pint. ``scene["wall"]`` is a
-    table of it in SI units; ``print(scene)`` shows all of them.
+    table of it in SI units, ``scene["wall.stiffness"]`` a number; ``print(scene)`` shows all of them.
 
     Attributes:
         scene: what it holds, typed.
@@ -50,12 +50,22 @@ class LoadedScene:
         return self.scene.as_dict()
 
     def __getitem__(self, key: str) -> Any:
-        if key not in (tables := self.tables):
-            raise KeyError(f"There is no {key} in this scene{meant(key, tables)}; it holds {', '.join(tables)}.")
-        return tables[key]
+        value, path = self.tables, list[str]()
+        for part in key.split("."):
+            held = dict(zip(map(str, range(len(value))), value, strict=True)) if isinstance(value, list) else value
+            if not isinstance(held, dict) or part not in held:
+                names = held if isinstance(held, dict) else ()
+                where, holds = ".".join(path) or "this scene", f"; it holds {', '.join(names)}" if names else ""
+                raise KeyError(f"There is no {part} in {where}{meant(part, names)}{holds}.")
+            value, path = held[part], [*path, part]
+        return value
 
     def __contains__(self, key: str) -> bool:
-        return key in self.tables
+        try:
+            self[key]
+        except KeyError:
+            return False
+        return True
 
     def __str__(self) -> str:
         return to_toml(self.tables)
@@ -155,11 +165,11 @@ def texts(values: Values) -> list[str]:
 
 
 def plain(value: Any) -> Any:
-    """Returns a value as a scene file holds it: pint's quantities as text with a unit, NumPy's numbers as Python's."""
+    """Returns a value as a scene file holds it: pint's quantities as text with a unit, NumPy's arrays as lists."""
     if isinstance(value, Mapping):
         return {str(key): plain(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
         return [plain(inner) for inner in value]
     if hasattr(value, "units") and hasattr(value, "magnitude"):
         return f"{float(value.magnitude)!r} {value.units:~C}"
-    return value.item() if hasattr(value, "item") else value
+    return value.tolist() if hasattr(value, "tolist") else value

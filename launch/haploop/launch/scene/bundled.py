@@ -45,6 +45,14 @@ def found(path: Path, folder: str, beside: Path = Path()) -> Path:
     return of_name(path.as_posix(), folder) or own
 
 
+def own_file(name: str, folder: str) -> Path | None:
+    """Returns the file of one's own that is taken here in place of a bundled one, None for none."""
+    for path in (Path(name), Path(folder, name)):
+        if (file := found(path, folder)) != of_name(name, folder):
+            return file
+    return None
+
+
 def about(path: Path) -> str:
     """Returns what a bundled file is, in a line: its title, else the comment that it begins with."""
     text = path.read_text(encoding="utf-8")

@@ -54,12 +54,19 @@ class Layers:
             key = key[:-1]
         return self.origins.get(key, str(self.path))
 
-    def complain(self, key: KeyPath, expected: str, given: str | None = None, nearest: str | None = None) -> None:
-        """Adds a mistake about ``key``, whose value is quoted unless ``given`` says what was found."""
+    def complain(
+        self, key: KeyPath, expected: str, given: str | None = None, nearest: str | None = None,
+        place: KeyPath | None = None,
+    ) -> None:  # fmt: skip
+        """Adds a mistake about ``key``, whose value is quoted unless ``given`` says what was found.
+
+        ``place`` is the key that stands where the mistake was made, if it is another.
+        """
         if given is None:
             given = f"is {_quoted(self.value(key))}"
-        origin = self.origin(key)
-        file, line = (origin, None) if origin == COMMAND_LINE else (shown(origin), line_in(origin, key))
+        place = place or key
+        origin = self.origin(place)
+        file, line = (origin, None) if origin == COMMAND_LINE else (shown(origin), line_in(origin, place))
         self.mistakes.append(Mistake(file, ".".join(map(str, key)), given, expected, nearest, line))
 
     def value(self, key: KeyPath) -> Any:

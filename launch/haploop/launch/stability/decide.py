@@ -45,7 +45,7 @@ _FINE_UM, _STILL_1_S = 10.0, 0.05
 
 WHY = {
     "diverged": "The run ended by itself: {detail}.",
-    "no contact": "No tick of the last half second, or of the second half of a shorter run, was in contact.",
+    "no contact": "No tick of the window at the end of the run was in contact.",
     "rest": "After a push of {push_N:.3g} N it came to rest, to 5 % within {settles_s:.2g} s.",
     "unmoved": "After a push of {push_N:.3g} N, which did not move it, it rested.",
     "unfelt": "After a push of {push_N:.3g} N it came to rest within {settles_s:.2g} s but for "

@@ -16,12 +16,12 @@ CROSSINGS = 4
 SMALLEST_SWING_M = 1e-6
 # A quantised position on the wall's face may lie inside by this much, relative to the face's position.
 ROUNDING = 1e-12
-_WINDOW = f"the last {WINDOW_S:g} s (second half of a shorter run)"
 # Why the window of a run bears no word, whatever is seen in it.
 UNTOLD = {
     "no tick": "The run ended before its first tick was done.",
     "failed": "The run failed, and nothing tells how it would have gone on.",
-    "changed": f"The loop was changed at {{at_s:g}} s, within {_WINDOW}, so that no window shows it as it is now.",
+    "changed": "The loop was changed at {at_s:g} s, within the window from {from_s:g} s on, "
+    "which does not show it as it is now.",
 }
 
 
@@ -111,11 +111,11 @@ class RunMeasures(NamedTuple):
             return Verdict("diverged", f"{diverged}.")
         window = self.window
         rule = (
-            f"In {_WINDOW} x crossed its trend line {window.crossings} "
+            f"From {window.figures.from_s:.6g} s on x crossed its trend line {window.crossings} "
             f"times by more than {self.swing_m * 1e6:.3g} µm, its second half {window.growth:.2f} times as wide as its "
             f"first; a limit cycle is at least {CROSSINGS} crossings and 0.5 times."
             if window.touched
-            else f"No tick of {_WINDOW} was in contact."
+            else f"No tick from {window.figures.from_s:.6g} s on was in contact."
         )
         if untold:
             return Verdict("undecided", untold if untold == UNTOLD["no tick"] else f"{untold} {rule}")
@@ -135,7 +135,9 @@ class RunMeasures(NamedTuple):
             return UNTOLD["no tick"]
         if ended == "failed":
             return UNTOLD["failed"]
-        return UNTOLD["changed"].format(at_s=changed_s) if changed_s is not None and self.window.touched else ""
+        if changed_s is None or not self.window.touched:
+            return ""
+        return UNTOLD["changed"].format(at_s=changed_s, from_s=self.window.figures.from_s)
 
     def of_two_loops(self) -> RunMeasures:
         """Returns them for a window in which the loop was changed: it displayed more than one stiffness."""

@@ -7,15 +7,17 @@ from typing import Annotated
 
 import typer
 
-from haploop.tools.cli.options import FAILED, WRONG_USE, Json, leave, plain_errors, print_json
+from haploop.tools.cli.options import FAILED, WRONG_USE, Json, complete, leave, plain_errors, print_json
+
+_YOURS = "here your own file is taken: {0}"
 
 
 def scenes(
     name: Annotated[str | None, typer.Argument(help="print this one's file, to be copied", show_default=False)] = None,
     json: Json = False,
 ) -> None:
-    """List the scenes, devices, hands and sweeps there are. Each is found by its name."""
-    from haploop.launch.scene.bundled import FOLDERS, about, bundled, of_name
+    """List the scenes, devices, hands and sweeps there are. Each is found by its name, after files of your own."""
+    from haploop.launch.scene.bundled import FOLDERS, about, bundled, of_name, own_file
 
     if name is not None:
         path = next(filter(None, (of_name(name, folder) for folder in FOLDERS)), None)
@@ -23,7 +25,13 @@ def scenes(
             leave(f"{name} does not come with haploop; haploop scenes lists what does.", WRONG_USE)
         print(path.read_text(encoding="utf-8"), end="")
         return
-    listed = {folder: {name: about(path) for name, path in bundled(folder).items()} for folder in FOLDERS}
+    listed = {
+        folder: {
+            name: _YOURS.format(own) if (own := own_file(name, folder)) else about(path)
+            for name, path in bundled(folder).items()
+        }
+        for folder in FOLDERS
+    }
     if json:
         print_json(listed)
         return
@@ -36,9 +44,14 @@ def scenes(
 def new(
     file: Annotated[Path, typer.Argument(help="scene file to write, not there yet", show_default=False)],
     device: Annotated[
-        str, typer.Option(metavar="NAME", help="that haploop scenes lists, or a file of yours")
+        str,
+        typer.Option(
+            metavar="NAME", help="that haploop scenes lists, or a file of yours", autocompletion=complete("devices")
+        ),
     ] = "premium15",
-    hand: Annotated[str, typer.Option(metavar="NAME", help="likewise")] = "fu_cavusoglu_y",
+    hand: Annotated[
+        str, typer.Option(metavar="NAME", help="likewise", autocompletion=complete("hands"))
+    ] = "fu_cavusoglu_y",
     wall: Annotated[
         str | None,
         typer.Option(

@@ -5,14 +5,47 @@ from __future__ import annotations
 import contextlib
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
 
 import typer
 
-SceneFile = Annotated[Path, typer.Argument(help="scene file (TOML)", show_default=False)]
+
+def complete(folder: str) -> Callable[[str], list[str]]:
+    """Returns what completes a word: the names of what comes with haploop in a folder, and files of one's own."""
+
+    def completed(begun: str) -> list[str]:
+        from glob import escape, glob
+
+        from haploop.launch.scene.bundled import bundled
+
+        own = [f"{path}/" if Path(path).is_dir() else path for path in sorted(glob(f"{escape(begun)}*"))]  # noqa: PTH207
+        names = [name for name in bundled(folder) if name.startswith(begun)]
+        return [*names, *(path for path in own if path.endswith(("/", ".toml")))]
+
+    return completed
+
+
+_A_HAND = "a hand that comes with haploop, a file with one, or none"
+SceneFile = Annotated[
+    Path, typer.Argument(help="scene file (TOML)", show_default=False, autocompletion=complete("scenes"))
+]
+SweepFile = Annotated[
+    Path, typer.Argument(help="sweep file (TOML)", show_default=False, autocompletion=complete("sweeps"))
+]
+Device = Annotated[
+    str,
+    typer.Argument(
+        help="a device that comes with haploop, or a scene", show_default=False, autocompletion=complete("devices")
+    ),
+]
+Hand = Annotated[str | None, typer.Option(metavar="HAND", help=_A_HAND, autocompletion=complete("hands"))]
+Delay = Annotated[str | None, typer.Option(metavar="TIME", help='round trip, s or "2 ms"')]
+Estimator = Annotated[
+    str | None, typer.Option(metavar="NAME", help="difference, window, foaw, kalman or accelerometer")
+]
 Directory = Annotated[Path, typer.Argument(help="directory of a run", show_default=False)]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a key of the scene")]
 Plugin = Annotated[list[Path] | None, typer.Option("--plugin", metavar="FILE", help="Python file with elements")]

@@ -50,18 +50,12 @@ def plot(
     A run that was killed is drawn as far as its log goes, a sweep as far as it has come. The last line names the
     figure's file.
     """
+    from haploop.tools.figure.command import draw_any
     from haploop.tools.figure.data import FigureError
-    from haploop.tools.figure.overlay import draw_overlay
-    from haploop.tools.figure.run_figure import draw
-    from haploop.tools.sweep.table import is_sweep
 
     with plain_errors():
         try:
-            if sweeps := [path for path in directory if is_sweep(path)]:
-                if len(directory) > 1:
-                    leave(f"{sweeps[0]} is a sweep, which is drawn by itself; runs are drawn together.", WRONG_USE)
-                from haploop.tools.sweep.map.figure import draw_map as draw
-            target = draw(directory[0], out) if len(directory) == 1 else draw_overlay(directory, out)
+            target = draw_any(directory, out)
         except FigureError as error:
             leave(str(error), WRONG_USE)
     print(target)

@@ -18,6 +18,7 @@ from haploop.tools.cli.options import (
     Json,
     Plugin,
     Set,
+    complete,
     leave,
     plain_errors,
     print_json,
@@ -34,7 +35,10 @@ _MOST_PRINTED = 20
 
 
 def check(
-    scene: Annotated[Path | None, typer.Argument(help="scene file (TOML)", show_default=False)] = None,
+    scene: Annotated[
+        Path | None,
+        typer.Argument(help="scene file (TOML)", show_default=False, autocompletion=complete("scenes")),
+    ] = None,
     set: Set = None,
     plugin: Plugin = None,
     schema: Annotated[bool, typer.Option("--schema", help="print the JSON Schema of scenes instead")] = False,

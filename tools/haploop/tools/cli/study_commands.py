@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from haploop.tools.cli.options import Json, Plugin, Set, parse_seconds
+from haploop.tools.cli.options import Delay, Device, Estimator, Hand, Json, Plugin, Set, SweepFile, parse_seconds
 
 
 def sweep(
-    sweep: Annotated[Path, typer.Argument(help="sweep file (TOML)", show_default=False)],
+    sweep: SweepFile,
     set: Set = None,
     out: Annotated[
         Path | None, typer.Option(help="directory; one that holds this sweep goes on [runs/SWEEP-TIME]")
@@ -98,14 +98,10 @@ def paper(
 
 
 def advise(
-    device: Annotated[str, typer.Argument(help="a device that comes with haploop, or a scene", show_default=False)],
-    hand: Annotated[
-        str | None, typer.Option(metavar="HAND", help="a hand that comes with haploop, a file with one, or none")
-    ] = None,
-    delay: Annotated[str | None, typer.Option(metavar="TIME", help='round trip, s or "2 ms"')] = None,
-    estimator: Annotated[
-        str | None, typer.Option(metavar="NAME", help="difference, window, foaw, kalman or accelerometer")
-    ] = None,
+    device: Device,
+    hand: Hand = None,
+    delay: Delay = None,
+    estimator: Estimator = None,
     set: Set = None,
     plugin: Plugin = None,
     workers: Annotated[int | None, typer.Option(help="processes [as many as cores]", show_default=False)] = None,

@@ -9,7 +9,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from haploop.tools.cli.options import FAILED, WRONG_USE, Json, Plugin, Set, leave, plain_errors, print_json
+from haploop.tools.cli.options import (
+    FAILED,
+    WRONG_USE,
+    Delay,
+    Device,
+    Estimator,
+    Hand,
+    Json,
+    Plugin,
+    Set,
+    leave,
+    plain_errors,
+    print_json,
+)  # fmt: skip
 
 _NO_BOUND = (
     "Force bounding is left out: of any wall that is pressed slowly it holds 2 b / T, b the damping that the device "
@@ -23,14 +36,10 @@ if TYPE_CHECKING:
 
 
 def compare(
-    device: Annotated[str, typer.Argument(help="a device that comes with haploop, or a scene", show_default=False)],
-    hand: Annotated[
-        str | None, typer.Option(metavar="HAND", help="a hand that comes with haploop, a file with one, or none")
-    ] = None,
-    delay: Annotated[str | None, typer.Option(metavar="TIME", help='round trip, s or "2 ms"')] = None,
-    estimator: Annotated[
-        str | None, typer.Option(metavar="NAME", help="difference, window, foaw, kalman or accelerometer")
-    ] = None,
+    device: Device,
+    hand: Hand = None,
+    delay: Delay = None,
+    estimator: Estimator = None,
     set: Set = None,
     plugin: Plugin = None,
     grid: Annotated[

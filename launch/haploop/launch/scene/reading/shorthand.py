@@ -38,7 +38,8 @@ def _count_range(layers: Layers) -> None:
         try:
             read[name] = number_of(CountedRange, name).read(encoder[name])
         except KeyError:
-            layers.complain(("encoder", name), expected, "is missing")
+            [other] = {*names} - {name}
+            layers.complain(("encoder", name), expected, "is missing", place=("encoder", other))
         except PydanticCustomError as error:
             layers.complain(("encoder", name), error.message())
     if "resolution" in encoder:
