@@ -26,6 +26,7 @@ from haploop.launch.stability.memory_drift import may_act
 from haploop.launch.stability.still_batch import StillBatch
 from haploop.launch.stability.still_hand import harder_hold, hold_of
 from haploop.launch.stability.swing import REST_M
+from haploop.protocol.scene.effects import Friction
 from haploop.protocol.trees import tree_take
 from haploop.protocol.walls.wall import Wall
 
@@ -43,8 +44,9 @@ def judge_batch(end: BatchEnd, looks_s: Sequence[float] = LOOKS_S) -> list[Findi
     touching = np.flatnonzero(end.inside.any(axis=1))
     hold_N = np.array([hold_of(end.scenes[i], end.time, end.tick, end.inside[i]) for i in touching])
     for first in range(0, len(touching), MOST):
-        some = touching[first : first + MOST]
-        for place, finding in zip(some, _judge_some(end, some, hold_N[first : first + MOST], looks_s), strict=True):
+        some, held_N = touching[first : first + MOST], hold_N[first : first + MOST]
+        judged = _without_friction(end, some, held_N, _judge_some(end, some, held_N, looks_s))
+        for place, finding in zip(some, judged, strict=True):
             found[place] = finding
     return found
 
@@ -69,6 +71,18 @@ def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s:
         for (place, harder), there in zip(harder_N.items(), at_hardest, strict=True):
             found[place] = found[place].held_harder(harder, there)
     return _with_chaos(end, members, hold_N, push_N, found, asked)
+
+
+def _without_friction(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, found: list[Finding]) -> list[Finding]:
+    """Returns the findings; of each loop that rests, also whether it would without its friction."""
+    rests = [place for place, each in enumerate(found) if is_struck(each)]
+    if not rests or not end.scenes[0].friction:
+        return found
+    free = end._replace(scenes=[replace(scene, friction=Friction(kinetic=0.0)) for scene in end.scenes])
+    push_N = np.array([push_of(hold) for hold in hold_N[rests]])
+    alike, _ = _watched(free, members[rests], hold_N[rests], push_N, (SMALLER, 1.0), LOOKS_S)
+    told = dict(zip(rests, alike, strict=True))
+    return [each.without_friction(told[place]) if place in told else each for place, each in enumerate(found)]
 
 
 def _watched(
