@@ -65,6 +65,18 @@ def test_the_stiffest_wall_below_which_all_are_steady_is_marked(figure: Any) -> 
     assert "Stiffest steady wall: 300 N/m" in legend(figure)
 
 
+def test_what_a_steady_verdict_rests_on_is_told_with_the_answer_and_counted() -> None:
+    """The stiffest steady wall is held by friction alone, and so is another one."""
+    axes = {K: STIFFNESSES[:3], B: [0.1, 0.2]}
+    held = {"provisos": ["only friction holds it"]}
+    results = [said("steady"), said("steady") | held, said("limit-cycle", 1e-3), said("steady") | held]
+    results += [said("limit-cycle", 1e-3), said("limit-cycle", 1e-3)]
+    told = legend(make_figure(table(axes, cells_of(axes), results, [None] * 6)))
+    assert "Stiffest steady wall: 200 N/m at dissipation.0.damping 0.2 N s/m" in told
+    assert "Yet: only friction holds it." in told
+    assert "Of the steady runs: only friction holds it (2)." in told
+
+
 @given(verdicts=st.lists(st.sampled_from(VERDICTS), min_size=12, max_size=12))
 def test_an_island_of_steady_walls_above_others_that_are_not_is_no_answer(verdicts: list[str]) -> None:
     axes = {K: STIFFNESSES, B: [0.1, 0.2, 0.5]}

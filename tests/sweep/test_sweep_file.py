@@ -15,6 +15,7 @@ from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import ElementTable
 from haploop.tools.sweep.cells import Extra
 from haploop.tools.sweep.sweep_file import load
+from haploop.tools.sweep.table import Column
 from helpers.scenes.least import KINDS
 from helpers.scenes.sweep_files import GRID, PRESS, loaded, mistakes, sweep_file
 
@@ -270,6 +271,16 @@ def test_what_is_recorded_may_come_from_any_corner_of_the_grid(tmp_path: Path) -
         "energy.wall.leak.delay_J",
     ]
     assert made.record[1].unit == "J"
+
+
+def test_what_a_verdict_rests_on_is_recorded_as_text_unless_the_verdict_is_the_cheap_one(tmp_path: Path) -> None:
+    axes = '[axes]\n"wall.stiffness" = [100, 200]\n'
+    pushed = loaded(tmp_path, '[set]\n"run.verdict" = "pushed"\n' + axes)
+    assert pushed.record[-1] == Column("stability.provisos", "string")
+    row = pushed.row(0, None, {"ended": "done", "verdict": "steady", "stability": {"provisos": ["a", "b"]}})
+    assert row["stability.provisos"] == "a; b"
+    cheap = loaded(tmp_path, '[set]\n"run.verdict" = "window"\n' + axes)
+    assert "stability.provisos" not in [column.name for column in cheap.record]
 
 
 def test_all_element_kinds_can_be_swept(tmp_path: Path) -> None:

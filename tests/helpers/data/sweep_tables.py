@@ -10,7 +10,8 @@ from typing import Any
 from haploop.launch.batch.run import run_batch
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.sweep.map.data import AMPLITUDE, MapData, make_map_data
+from haploop.tools.sweep.map.data import AMPLITUDE, PROVISOS, MapData, make_map_data
+from haploop.tools.sweep.table import JOINS
 from helpers.scenes.least import KINDS, scene
 
 UNITS = {
@@ -51,6 +52,8 @@ def table(
     columns["cell"] = [*range(len(cells))]
     columns["verdict"] = [result.get("verdict") for result in results]
     columns[AMPLITUDE] = [result.get("window", {}).get("oscillation_m") for result in results]
+    if any("provisos" in result for result in results):
+        columns[PROVISOS] = [JOINS.join(result.get("provisos", [])) for result in results]
     columns["ended"] = [result.get("ended", "done") for result in results]
     columns["why"] = [result.get("why", "") for result in results]
     columns["scene"] = [None if scene is None else to_toml(scene.as_dict()) for scene in scenes]

@@ -23,7 +23,7 @@ from haploop.tools.executor.pool import Group
 from haploop.tools.executor.work import Sources, load_kinds
 from haploop.tools.search.bisect import Tolerance
 from haploop.tools.sweep.cell_scene import Base, Values
-from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SCENE, SEED, TEXT, WHOLE, WHY, Column, Row
+from haploop.tools.sweep.table import CELL, ENDED, JOINS, NUMBER, SCENE, SEED, TEXT, WHOLE, WHY, Column, Row
 
 # Scenes that differ in these tables are run in different arrays.
 _APART = ("clock", "duration", "event")
@@ -194,4 +194,6 @@ class Sweep:
 
 def _entry(result: Summary, column: Column) -> Any:
     value = value_at(result, column.name)
+    if isinstance(value, list):
+        return JOINS.join(value)
     return value if value is None or column.kind != NUMBER else float(value)

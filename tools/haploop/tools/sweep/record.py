@@ -28,7 +28,7 @@ Complain = Callable[[int, str, str | None], None]
 
 def usual(base: Scene) -> list[str]:
     """Returns the keys that are recorded unless others are asked for."""
-    return [*_USUAL, *(["stability.width_m"] if base.run.verdict == "pushed" else [])]
+    return [*_USUAL, *(["stability.width_m", "stability.provisos"] if base.run.verdict == "pushed" else [])]
 
 
 def make_columns(
@@ -84,7 +84,8 @@ def _short_run(scene: Scene, kinds: Mapping[str, type[Element]]) -> Summary:
 
 
 def _leaves(value: Any, key: str = "") -> Summary:
-    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else None
+    listed = isinstance(value, list) and any(isinstance(entry, dict) for entry in value)
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if listed else None
     if inner is None:
         return {key: value}
     found: Summary = {}
@@ -99,4 +100,4 @@ def _without_places(name: str) -> str:
 
 
 def _kind(value: Any) -> str:
-    return TRUTH if isinstance(value, bool) else TEXT if isinstance(value, str) else NUMBER
+    return TRUTH if isinstance(value, bool) else TEXT if isinstance(value, str | list) else NUMBER

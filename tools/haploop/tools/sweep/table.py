@@ -20,6 +20,8 @@ from haploop.protocol.names import meant
 CELL, SEED, ENDED, WHY, SCENE = "cell", "seed", "ended", "why", "scene"
 # Kinds of column, and the types they have in Parquet.
 NUMBER, WHOLE, TEXT, TRUTH = "float64", "int64", "string", "bool"
+# Stands between the texts of a list that is recorded.
+JOINS = "; "
 # A row by column: numbers, text, truth values, None where there is nothing.
 Row = dict[str, Any]
 # What sweep.toml holds: title, repeat, record, axes (values by key), bisect and base, the tables of the scene.

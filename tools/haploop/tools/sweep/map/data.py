@@ -13,9 +13,10 @@ import numpy as np
 
 from haploop.tools.figure.data import FigureError
 from haploop.tools.sweep.map.axis import Axis
-from haploop.tools.sweep.table import ResolvedSweep
+from haploop.tools.sweep.table import JOINS, ResolvedSweep
 
 AMPLITUDE, WIDTH, STIFFNESS = "window.oscillation_m", "stability.width_m", "wall.stiffness"
+PROVISOS = "stability.provisos"
 NOT_RUN = -1
 MOST_PANELS = 12
 # By name, equally long: lists or NumPy arrays.
@@ -158,6 +159,10 @@ class MapData:
         np.fmax.at(amplitude, at_shown, swings_m[shown])
         np.fmin.at(least, at, swings_m)
         return Cells(worst, amplitude, np.where(np.isinf(least), math.nan, least), agree, seeds, first)
+
+    def provisos(self, row: int) -> list[str]:
+        """Returns what the verdict of a row rests on, where that is recorded."""
+        return list(filter(None, str(self.columns.get(PROVISOS, {row: ""})[row] or "").split(JOINS)))
 
     def amplitudes_m(self) -> np.ndarray:
         """Returns how far every row swings: a limit cycle by what remains of it after a push, where that is recorded.

@@ -60,14 +60,26 @@ def _span(axis: Axis) -> str:
     return f"{first}–{last} {unit}".rstrip() + f" ({len(axis.planned)})"
 
 
-def _answer(axes: Sequence[Axis], found: Answer | None) -> str:
+def _answer(data: MapData, cells: Cells) -> str:
+    axes, found = data.axes, stiffest_steady(data.axes, cells)
     if not any(axis.key == STIFFNESS for axis in axes):
         return ""
     if found is None:
         return "No wall is steady from the softest one on that was tried."
     others = _place(pair for pair in zip(axes, found.index, strict=True) if pair[0].key != STIFFNESS)
     more = "No stiffer one was tried." if found.open_end else "Every softer one tried there is steady, too."
-    return f"★ Stiffest steady wall: {spring(found.value)}{others}. {more}"
+    told = data.provisos(int(cells.row[found.index]))
+    yet = f" Yet: {', '.join(told)}." if told else ""
+    return f"★ Stiffest steady wall: {spring(found.value)}{others}. {more}{yet}"
+
+
+def _provisos(data: MapData) -> str:
+    """Returns how many steady runs rest on what."""
+    counts = Counter(
+        proviso for row in np.flatnonzero(data.verdicts == Verdict.STEADY).tolist() for proviso in data.provisos(row)
+    )
+    listed = ", ".join(f"{proviso} ({count})" for proviso, count in counts.most_common())
+    return f"Of the steady runs: {listed}." if listed else ""
 
 
 def _place(at: Iterable[tuple[Axis, int]]) -> str:
@@ -94,7 +106,8 @@ def map_notes(data: MapData, cells: Cells, layout: Layout, lines: Sequence[Panel
     some = "" if all(panel.why_none for panel in lines) else " in some panels"
     where = "panel" if len(lines) == 1 else "panels that do not show them"
     return _those({
-        _answer(data.axes, stiffest_steady(data.axes, cells)): True,
+        _answer(data, cells): True,
+        _provisos(data): True,
         f"The first {len(lines)} of {panels} panels are drawn.": panels > len(lines),
         f"No exact limit{some}, since the loop is not linear: {reasons}.": reasons,
         f"Outside the {where}: {outside}.": outside,
@@ -122,6 +135,7 @@ def edge_notes(data: MapData, edges: Edges, best: Answer | None, lines: Sequence
         f"× not {holds} where the search begins.": State.NONE_HOLDS in edges.state,
         "? a run failed before a boundary was found.": State.UNKNOWN in edges.state,
         f"{edges.more} of {len(data.boundary['low'])} searches changed more than once.": edges.more,
+        _provisos(data): True,
         f"No exact limit, since the loop is not linear: {reasons}.": reasons,
         _failures(data): True,
     })  # fmt: skip
