@@ -78,6 +78,8 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
         with pytest.raises(TimeoutError):
             loop.wait(0.01)
         assert loop.step(100) == 100
+        seen = loop.status()["status"]
+        assert seen.get("verdict", "undecided") == "undecided"  # less than half a second of it
         with pytest.raises(CommandRefused, match="did you mean damping"):
             loop.swap("dampin", damping=1.0)
         tick = loop.swap("unidirectional-inertia", mass="10 g")

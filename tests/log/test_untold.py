@@ -36,7 +36,7 @@ def test_a_window_that_spans_a_change_bears_no_word_and_shows_no_stiffness(tmp_p
     """Alone, in a batch, in the report and in the figure; one that begins with the change does."""
     late, early = run(changed(1.4, tmp_path / "late"), in_process=True), run(changed(1.0), in_process=True)
     assert (late["verdict"], late["window"]["displayed_stiffness_N_m"]) == ("undecided", None)
-    assert "The loop was changed at 1.4 s, within the last 0.5 s" in late["verdict_rule"]
+    assert "The loop was changed at 1.4 s, within the window from 1 s on" in late["verdict_rule"]
     assert early["verdict"] == "steady"
     assert early["window"]["displayed_stiffness_N_m"] is not None
     text = shown(summary_table(late))
@@ -70,7 +70,7 @@ def test_a_run_that_fails_is_undecided_in_its_summary_report_and_page_and_failed
             run_in_process(spec.scene, kinds, out=out / word, attachments=spec.attachments)
     summary = read(out / "undecided/summary.json")
     assert (summary["ended"], summary["verdict"]) == ("failed", "undecided")
-    assert summary["verdict_rule"].startswith("The run failed, and nothing tells how it would have gone on. In the")
+    assert summary["verdict_rule"].startswith("The run failed, and nothing tells how it would have gone on. From ")
     assert shown(summary_table(summary)).startswith("undecided")
     assert words(make_figure(RunData.from_directory(out / "undecided")), "verdict") == ["failed"]
     session = cast(Any, SimpleNamespace(summary=summary, scene=spec.scene, outcome="failed"))

@@ -16,7 +16,7 @@ from haploop.logger.books.buffers import ControllerBuffer, PlantBuffer
 from haploop.logger.log.channels import Channels, motion_columns
 from haploop.logger.summary import Account, Summary, energy, note_accounts, outcome, versions
 from haploop.logger.verdict.changes_made import ChangesMade
-from haploop.logger.verdict.measures import RunMeasures
+from haploop.logger.verdict.measures import UNTOLD, WINDOW_S, RunMeasures
 from haploop.logger.verdict.window import CONTROLLER_COLUMNS, Window
 from haploop.plant.counters import COUNTERS
 from haploop.protocol.changes import Event
@@ -244,7 +244,8 @@ class Logger:
         if self.tick == self._first_tick:
             return {}
         measures, books, changed_s = self._measured(), self.books.state, self._changed_s
-        verdict = measures.verdict(None, measures.untold(self.tick, "", changed_s))
+        is_short = self.tick - self._first_tick < WINDOW_S * self.time.control_rate
+        verdict = measures.verdict(None, UNTOLD["short"] if is_short else measures.untold(self.tick, "", changed_s))
         figures = (measures if changed_s is None else measures.of_two_loops()).window.figures
         return {
             "t_s": self.tick / self.time.control_rate,

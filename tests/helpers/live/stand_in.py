@@ -53,7 +53,7 @@ RUNNING = {
         "to_s": 1.5, "so_far": False, "oscillation_m": 0.00535, "ripple_N": 0.41, "force_swing_N": 0.41,
         "frequency_Hz": 8.25, "stiffness_N_m": 137.2,
     },
-    "verdict_rule": "In the last 0.5 s x crossed its trend line 24 times.",
+    "verdict_rule": "From 1.5 s on x crossed its trend line 24 times.",
     "oscillation_m": 0.00535, "displayed_stiffness_N_m": 137.2, "residual_J": 2.1e-18, "moved_J": 6.2e-3,
     "nodes": [
         {"role": "plant", "pid": 11, "tick": 1500, "behind_ticks": 0, "waits_for": "controller", "lossless": True,

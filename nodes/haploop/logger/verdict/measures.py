@@ -19,6 +19,7 @@ ROUNDING = 1e-12
 # Why the window of a run bears no word, whatever is seen in it.
 UNTOLD = {
     "no tick": "The run ended before its first tick was done.",
+    "short": f"Less than {WINDOW_S:g} s of the run was seen.",
     "failed": "The run failed, and nothing tells how it would have gone on.",
     "changed": "The loop was changed at {at_s:g} s, within the window from {from_s:g} s on, "
     "which does not show it as it is now.",
