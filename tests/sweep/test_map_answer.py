@@ -75,6 +75,12 @@ def test_what_a_steady_verdict_rests_on_is_told_with_the_answer_and_counted() ->
     assert "Stiffest steady wall: 200 N/m at dissipation.0.damping 0.2 N s/m" in told
     assert "Yet: only friction holds it." in told
     assert "Of the steady runs: only friction holds it (2)." in told
+    assert "No run was pushed" not in told
+
+
+def test_a_map_of_cheap_verdicts_says_that_no_run_was_pushed(data: MapData) -> None:
+    cheap = dataclasses.replace(data, sweep={**data.sweep, "base": {"title": "a base", "run": {"verdict": "window"}}})
+    assert "No run was pushed: the words are what its last half second shows" in legend(make_figure(cheap))
 
 
 @given(verdicts=st.lists(st.sampled_from(VERDICTS), min_size=12, max_size=12))

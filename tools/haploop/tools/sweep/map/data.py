@@ -160,6 +160,11 @@ class MapData:
         np.fmin.at(least, at, swings_m)
         return Cells(worst, amplitude, np.where(np.isinf(least), math.nan, least), agree, seeds, first)
 
+    @property
+    def is_unpushed(self) -> bool:
+        """Tells whether the verdicts are the cheap ones."""
+        return self.sweep.get("base", {}).get("run", {}).get("verdict") == "window"
+
     def provisos(self, row: int) -> list[str]:
         """Returns what the verdict of a row rests on, where that is recorded."""
         return list(filter(None, str(self.columns.get(PROVISOS, {row: ""})[row] or "").split(JOINS)))

@@ -18,6 +18,7 @@ from haploop.tools.sweep.map.looks import verdict_words
 # What fits into the line below the title; the base scene's title is cut short before anything else is.
 _BETWEEN, _LETTERS, _LEAST_LETTERS = "   ·   ", 185, 12
 _REASON_LETTERS = 160
+_UNPUSHED = "No run was pushed: the words are what its last half second shows, and say little of stability."
 
 
 def description(data: MapData, cells: Cells) -> str:
@@ -108,6 +109,7 @@ def map_notes(data: MapData, cells: Cells, layout: Layout, lines: Sequence[Panel
     return _those({
         _answer(data, cells): True,
         _provisos(data): True,
+        _UNPUSHED: data.is_unpushed,
         f"The first {len(lines)} of {panels} panels are drawn.": panels > len(lines),
         f"No exact limit{some}, since the loop is not linear: {reasons}.": reasons,
         f"Outside the {where}: {outside}.": outside,
@@ -136,6 +138,7 @@ def edge_notes(data: MapData, edges: Edges, best: Answer | None, lines: Sequence
         "? a run failed before a boundary was found.": State.UNKNOWN in edges.state,
         f"{edges.more} of {len(data.boundary['low'])} searches changed more than once.": edges.more,
         _provisos(data): True,
+        _UNPUSHED: data.is_unpushed,
         f"No exact limit, since the loop is not linear: {reasons}.": reasons,
         _failures(data): True,
     })  # fmt: skip
