@@ -1,17 +1,21 @@
 """Files that come with haploop are found by their names wherever one is, one's own first."""
 
+import json
+import re
 import tomllib
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from haploop.launch.scene.bundled import FOLDERS, about, bundled
+from haploop.launch.scene.bundled import FOLDERS, about, bundled, own_file
 from haploop.launch.scene.file import load
+from haploop.launch.scene.layers import read_layers
 from haploop.launch.scene.mistakes import SceneError
 from haploop.protocol.scene.hand_force import Ramp, Sine
 from haploop.tools.advise.subject import assumptions
 from haploop.tools.cli.app import app
+from haploop.tools.cli.options import complete
 from haploop.tools.sweep import sweep_file
 from helpers.scenes.least import LEAST_TOML
 
@@ -103,6 +107,48 @@ def test_what_comes_with_haploop_is_printed_by_its_name_and_can_be_copied():
     unknown = call("scenes", "premium16")
     assert unknown.exit_code == 2
     assert "premium16 does not come with haploop" in unknown.stderr
+
+
+COPIED = [(folder, name) for folder in FOLDERS for name in bundled(folder)]
+
+
+@pytest.mark.parametrize(("folder", "name"), COPIED, ids=map("/".join, COPIED))
+def test_a_copy_of_every_file_is_read_anywhere_as_the_original(folder, name):
+    copy = Path("copy.toml")
+    copy.write_text(call("scenes", f"{folder}/{name}").stdout)
+    original = bundled(folder)[name]
+    if folder == "sweeps":
+        assert sweep_file.load(copy) == sweep_file.load(original)
+    else:
+        assert read_layers(copy).data == read_layers(original).data
+
+
+def test_a_file_of_ones_own_that_a_bare_name_stands_for_is_noted():
+    own = "Note: demo is your own demo.toml, taken in place of the one that comes with haploop.\n"
+    assert own not in call("check", "demo").stderr
+    Path("demo.toml").write_text(OWN)
+    for command in ("check", "explain"):
+        assert own in call(command, "demo").stderr
+        assert own not in call(command, "demo.toml").stderr
+    answered = call("check", "demo", "--json")
+    assert json.loads(answered.stdout)["title"] == "my own"
+    assert own in answered.stderr
+
+
+def test_files_of_ones_own_are_listed_and_no_others():
+    assert "your own" not in call("scenes").stdout
+    Path("fig6a.toml").write_text(OWN)
+    assert re.search(r"fig6a +here your own file is taken: fig6a.toml", call("scenes").stdout)
+    assert own_file("fig6b", "scenes") is None
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_a_word_is_completed_by_names_and_by_files_of_ones_own(folder):
+    Path("folder").mkdir()
+    Path("fork.toml").touch()
+    Path("form.txt").touch()
+    assert complete(folder)("") == [*bundled(folder), "folder/", "fork.toml"]
+    assert complete(folder)("fork") == ["fork.toml"]
 
 
 @pytest.mark.parametrize("device", bundled("devices"))

@@ -47,10 +47,20 @@ def found(path: Path, folder: str, beside: Path = Path()) -> Path:
 
 def own_file(name: str, folder: str) -> Path | None:
     """Returns the file of one's own that is taken here in place of a bundled one, None for none."""
+    bundled_one = of_name(name, folder)
     for path in (Path(name), Path(folder, name)):
-        if (file := found(path, folder)) != of_name(name, folder):
+        file = found(path, folder)
+        if bundled_one is None or not (os.path.exists(file) and os.path.samefile(file, bundled_one)):  # noqa: PTH110, PTH121
             return file
     return None
+
+
+def taken_instead(name: str, folder: str) -> Path | None:
+    """Returns the file of one's own that a bare name stands for, though one of that name comes with haploop."""
+    bundled_one, file = of_name(name, folder), found(Path(name), folder)
+    if bundled_one is None or name.endswith(".toml") or os.path.samefile(file, bundled_one):  # noqa: PTH121
+        return None
+    return file
 
 
 def about(path: Path) -> str:

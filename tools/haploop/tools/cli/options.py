@@ -28,20 +28,48 @@ def complete(folder: str) -> Callable[[str], list[str]]:
     return completed
 
 
+_INSTEAD = "Note: {0} is your own {1}, taken in place of the one that comes with haploop."
+
+
+def told(folder: str) -> Callable[[Any], Any]:
+    """Returns what notes on stderr that a name stands for a file of one's own, though one comes with haploop."""
+
+    def as_given(name: Any) -> Any:
+        from haploop.launch.scene.bundled import taken_instead
+
+        if name is not None and (file := taken_instead(str(name), folder)):
+            print(_INSTEAD.format(name, file), file=sys.stderr)
+        return name
+
+    return as_given
+
+
 _A_HAND = "a hand that comes with haploop, a file with one, or none"
 SceneFile = Annotated[
-    Path, typer.Argument(help="scene file (TOML)", show_default=False, autocompletion=complete("scenes"))
+    Path,
+    typer.Argument(
+        help="scene file (TOML)", show_default=False, autocompletion=complete("scenes"), callback=told("scenes")
+    ),
 ]
 SweepFile = Annotated[
-    Path, typer.Argument(help="sweep file (TOML)", show_default=False, autocompletion=complete("sweeps"))
+    Path,
+    typer.Argument(
+        help="sweep file (TOML)", show_default=False, autocompletion=complete("sweeps"), callback=told("sweeps")
+    ),
 ]
 Device = Annotated[
     str,
     typer.Argument(
-        help="a device that comes with haploop, or a scene", show_default=False, autocompletion=complete("devices")
+        help="a device that comes with haploop, or a scene",
+        show_default=False,
+        autocompletion=complete("devices"),
+        callback=told("devices"),
     ),
 ]
-Hand = Annotated[str | None, typer.Option(metavar="HAND", help=_A_HAND, autocompletion=complete("hands"))]
+Hand = Annotated[
+    str | None,
+    typer.Option(metavar="HAND", help=_A_HAND, autocompletion=complete("hands"), callback=told("hands")),
+]
 Delay = Annotated[str | None, typer.Option(metavar="TIME", help='round trip, s or "2 ms"')]
 Estimator = Annotated[
     str | None, typer.Option(metavar="NAME", help="difference, window, foaw, kalman or accelerometer")

@@ -22,6 +22,7 @@ from haploop.tools.cli.options import (
     leave,
     plain_errors,
     print_json,
+    told,
 )
 
 if TYPE_CHECKING:
@@ -37,7 +38,12 @@ _MOST_PRINTED = 20
 def check(
     scene: Annotated[
         Path | None,
-        typer.Argument(help="scene file (TOML)", show_default=False, autocompletion=complete("scenes")),
+        typer.Argument(
+            help="scene file (TOML)",
+            show_default=False,
+            autocompletion=complete("scenes"),
+            callback=told("scenes"),
+        ),
     ] = None,
     set: Set = None,
     plugin: Plugin = None,
