@@ -173,7 +173,8 @@ def test_extends_is_a_path_or_a_list_of_them(files, extends):
         (b"", "The file is empty; a scene needs at least a duration and a [device]."),
         (b"# nothing but this\n", "The file is empty; a scene needs at least a duration and a [device]."),
         (b'title = "\xff"', "A scene must be UTF-8 text, but byte 9 is not."),
-        (b"a = 1\nb = = 2\n", "This is not TOML: Invalid value (at line 2, column 5)."),
+        (b"a = 1\nb = = 2\n", ":2: This is not TOML: Invalid value (at line 2, column 5)."),
+        (b"a = 1\nb = [2,\n", ":2: This is not TOML: "),
         (b"seed = " + 5000 * b"9", "This is not TOML: "),
         (b"a = " + 5000 * b"[", "Tables and lists may lie at most 32 deep in one another."),
     ],
@@ -183,7 +184,7 @@ def test_a_file_that_cannot_be_read_says_why(tmp_path, monkeypatch, content, sen
     if content is not None:
         (tmp_path / "x.toml").write_bytes(content)
     [mistake] = file_mistakes(tmp_path / "x.toml")
-    assert mistake.startswith(f"x.toml: {sentence}")
+    assert mistake.startswith(f"x.toml{sentence}" if sentence[0] == ":" else f"x.toml: {sentence}")
 
 
 def test_a_directory_is_no_scene(tmp_path):
@@ -294,7 +295,7 @@ def test_an_encoder_has_its_resolution_or_both_bits_and_range(files):
     assert file_mistakes(path, "encoder.range=-1")[0].startswith("--set: encoder.range is -1. It must be above 0 m.")
     path.write_text(COUNTED.replace("bits = 14\n", ""))
     assert file_mistakes(path) == [
-        "top.toml:5: encoder.bits is missing. An encoder has its resolution, or both bits and range."
+        "top.toml:6: encoder.bits is missing. An encoder has its resolution, or both bits and range."
     ]
     said = file_mistakes(path, "encoder.counts=4096")
     assert any('counts over 0.2 m are bits = 12 and range = "0.2 m"' in each for each in said)

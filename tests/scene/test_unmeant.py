@@ -15,7 +15,7 @@ from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import SceneError
 from haploop.tools.cli.app import app
-from helpers.scenes.least import KINDS, WALL, scene
+from helpers.scenes.least import KINDS, LEAST_TOML, WALL, scene
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 PUSHED = {"mass": 0.1, "damping": 2.0, "stiffness": 100.0, "force": {"kind": "ramp", "value": -10, "rise_time": 0.1}}
@@ -58,6 +58,16 @@ CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"hand": PUSHED, "duration": 1e5}, {"hand": PUSHED, "duration": 1e4}, "The run has 1e+08 ticks"),
     ({"hand": PUSHED, "dissipation": [{"kind": "damping", "damping": 1.0}]},
      {"hand": PUSHED, "dissipation": [{"kind": "damping", "damping": 1.0, "acts": "always"}]}, "Nothing is ever in"),
+    ({"hand": PUSHED, "wall": {"position": -0.01, "stiffness": 1}},
+     {"hand": PUSHED, "wall": {"position": -0.01, "stiffness": 1000}}, "wall.stiffness is 1 N/m; is that the unit"),
+    ({"hand": PUSHED, "wall": {"position": -0.01, "stiffness": 150}},
+     {"hand": PUSHED, "wall": {"position": -0.01, "stiffness": 400}}, "gives way by 36 mm to the hand's largest force"),
+    ({"hand": PUSHED, "wall": {"position": -0.12, "stiffness": 1000}},
+     {"hand": PUSHED, "wall": {"position": -0.09, "stiffness": 1000}}, "holds the device 100 mm from"),
+    ({"hand": PUSHED, "wall": WALL, "event": [{"at": 0.5, "set": {"wall.stiffness": each}} for each in (900, 950)]},
+     {"hand": PUSHED, "wall": WALL, "event": [{"at": 0.5, "set": {"wall.stiffness": 900, "wall.position": -0.01}},
+                                              {"at": 0.501, "set": {"wall.stiffness": 950}}]},
+     "Two events change wall.stiffness at 0.5 s (tick 500)"),
 ]  # fmt: skip
 
 
@@ -95,11 +105,12 @@ def test_a_wall_called_out_of_reach_is_not_met_even_by_a_force_at_the_natural_fr
     device = {"mass": 0.01, "damping": 0.0, "velocity": -0.1}
     reached = farthest_m(tmp_path, hand=hand, device=device)
 
-    def notes_of(place_m: float) -> list[str]:
-        return note_unmeant(scene(hand=hand, device=device, wall={"position": -place_m, "stiffness": 10}))
+    def is_noted(place_m: float) -> bool:
+        notes = note_unmeant(scene(hand=hand, device=device, wall={"position": -place_m, "stiffness": 10}))
+        return any(note.startswith("The wall is never reached") for note in notes)
 
-    assert not notes_of(0.999 * reached)
-    assert notes_of(6.0 * reached + 0.02)
+    assert not is_noted(0.999 * reached)
+    assert is_noted(6.0 * reached + 0.02)
 
 
 @pytest.mark.parametrize("kind", ["step", "ramp"])
@@ -110,8 +121,10 @@ def test_a_wall_called_out_of_reach_of_a_chain_is_not_met_by_a_force_that_grows(
     tables = {"hand": hand, "device": {"mass": 0.05, "damping": 0.01}}
     reached = farthest_m(tmp_path, **tables)
     assert reached > 0.007
-    assert not note_unmeant(scene(**tables, wall={"position": -0.999 * reached, "stiffness": 10}))
-    assert note_unmeant(scene(**tables, wall={"position": -3.0 * reached - 0.005, "stiffness": 10}))
+    [swing] = note_unmeant(scene(**tables, wall={"position": -0.999 * reached, "stiffness": 500}))
+    assert "holds the device 5 mm from its spring's rest" in swing
+    [never] = note_unmeant(scene(**tables, wall={"position": -3.0 * reached - 0.005, "stiffness": 500}))
+    assert never.startswith("The wall is never reached")
 
 
 def test_what_may_yet_push_or_reach_silences_the_rule():
@@ -132,6 +145,47 @@ def test_check_notes_what_cannot_be_meant_and_does_not_refuse_it():
     assert far.stderr.count("Note: The wall is at -60 m") == 1
     assert [note for note in json.loads(far.stdout)["notes"] if note.startswith("The wall is at -60 m")]
     assert json.loads(CliRunner().invoke(app, ["check", fig, "--json"]).stdout)["notes"] == []
+
+
+def test_a_note_names_the_line_it_speaks_of_whatever_file_that_is_in_and_none_of_what_set_gave(tmp_path):
+    (tmp_path / "beneath.toml").write_text(LEAST_TOML + "[wall]\nposition = -60.0\nstiffness = 150.0\n")
+    mine = tmp_path / "mine.toml"
+    mine.write_text(
+        'extends = "beneath.toml"\n[device]\nvelocity = -1.0\n[wall]\nstiffness = 3\n'
+        '[[event]]\nat = 0.5\nset = { "wall.stiffness" = 100 }\n[[event]]\nat = 0.2\npause = true\n'
+        '[[event]]\nat = 0.5\nset = { "wall.stiffness" = 200 }\n'
+    )
+    line = LEAST_TOML.count("\n") + 2
+    told = CliRunner().invoke(app, ["check", str(mine), "--set", "noise.deviation=1", "--set", "noise.cutoff=9"]).stderr
+    assert told.splitlines()[0] == ""
+    assert f"{tmp_path}/beneath.toml:{line}: Note: The wall is at -60 m" in told
+    assert f"{mine}:5: Note: wall.stiffness is 3 N/m" in told
+    assert f"{mine}:6: Note: Two events change wall.stiffness at 0.5 s" in told
+    assert "\nNote: noise.deviation is 1 m" in told
+
+
+def test_a_second_swap_of_one_tick_is_noted_unless_the_first_removed_what_stood_there():
+    swap = {"kind": "damping", "damping": 1.0}
+    own = {"hand": PUSHED, "wall": WALL | {"stiffness": 1000}, "dissipation": [swap, swap]}
+
+    def noted(*changes: dict[str, Any]) -> bool:
+        events = [{"at": 0.5, **change} for change in changes]
+        return any("Two events change dissipation.0" in note for note in note_unmeant(scene(**own, event=events)))
+
+    assert noted({"swap": swap}, {"swap": swap})
+    assert noted({"set": {"dissipation.0.damping": 2}}, {"swap": swap})
+    assert not noted({"swap": swap}, {"set": {"dissipation.0.damping": 2}})
+    assert not noted({"swap": swap}, {"swap": swap, "element": 1})
+    assert not noted({"swap": {"kind": "none"}}, {"swap": swap})
+
+
+def test_the_report_of_a_run_without_contact_says_why(tmp_path):
+    far = tmp_path / "far.toml"
+    far.write_text(LEAST_TOML + "[hand]\nstiffness = 10\nmass = 0.1\ndamping = 0.5\nforce.kind = \"ramp\"\n"
+                   "force.value = -1\nforce.rise_time = 0.1\n[wall]\nposition = -0.2\nstiffness = 1000\n")  # fmt: skip
+    report = CliRunner().invoke(app, ["run", str(far), "--in-process", "--out", str(tmp_path / "out")]).stdout
+    assert "no-contact" in report
+    assert "the wall is 200 mm from there" in " ".join(report.split())
 
 
 def test_the_last_line_of_check_is_its_verdict_and_the_notes_stand_before_it():

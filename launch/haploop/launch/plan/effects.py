@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from haploop.controller.estimators.choose import estimator_class, estimators_for
 from haploop.launch.plan import rules
 from haploop.launch.plan.effect import CHAIN, COUNTED, HISTORY, LINE, LINEAR_RATES, NOISY, RUBBING, Effect
-from haploop.launch.plan.meant import note_unmeant
+from haploop.launch.plan.meant import Note, note_unmeant
 from haploop.plant.integrators.registry import find_integrator, integrator_module, integrator_names
 from haploop.protocol.installed import entry_points_of
 from haploop.protocol.scene.effects import Accelerometer
@@ -175,10 +175,14 @@ def effects_of(scene: Scene) -> tuple[Effect, ...]:
     return tuple(effect for effect in all_effects() if effect.is_in(scene))
 
 
-def notes(scene: Scene, kinds: Mapping[str, type[Element]] | None = None) -> list[str]:
+def notes(scene: Scene, kinds: Mapping[str, type[Element]] | None = None) -> list[Note]:
     """Returns what is in order in a resolved scene, but may not be what was meant; one sentence each.
 
     ``kinds`` are those of its elements; nothing is said of these without.
     """
-    of_effects = [note for effect in all_effects() if effect.is_named(scene) for note in effect.note(scene)]
-    return note_unmeant(scene) + of_effects + rules.note_order(scene, kinds or {})
+    of_effects = [
+        Note(note, effect.key) for effect in all_effects() if effect.is_named(scene) for note in effect.note(scene)
+    ]
+    return (
+        note_unmeant(scene) + of_effects + [Note(note, "dissipation") for note in rules.note_order(scene, kinds or {})]
+    )

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from haploop.protocol.scene.hand_force import Sine, Trace, constant_from_s
 from haploop.protocol.scene.paths import value_at
-from haploop.protocol.scene.scene import Scene, Wall, accelerometer_is_used, hand_is_unmodelled
+from haploop.protocol.scene.scene import NO_ELEMENT, Scene, Wall, accelerometer_is_used, hand_is_unmodelled
 from haploop.protocol.walls.registry import make_wall
 
+# A softer wall is mostly one meant in N/mm.
+_SOFTEST_N_M = 20.0
 # Beyond these a number is in order, but more often a slip of the unit: key, least, most, unit.
 _USUAL = (
     ("clock.round_trip_delay", 0.0, 1.0, "s"),
-    ("wall.stiffness", 1.0, 1e6, "N/m"),
+    ("wall.stiffness", _SOFTEST_N_M, 1e6, "N/m"),
     ("device.mass", 1e-4, 10.0, "kg"),
     ("encoder.resolution", 1e-10, 1e-3, "m"),
     ("noise.deviation", 1e-10, 1e-3, "m"),
@@ -23,14 +25,37 @@ _USUAL = (
 )
 _MANY_TICKS, _DEEP_M = 1000, 1e-3
 _LONG_TICKS = 10_000_000
-Found = Mapping[str, float]
+# A hand that presses deeper than this is at the end of most devices' way.
+_DEEPEST_PRESSED_M = 0.02
+Found = Mapping[str, Any]
+
+
+class Note(str):
+    """A sentence on a scene that is in order.
+
+    Attributes:
+        key: what it speaks of, a dotted key of the resolved scene.
+        keeps_off: whether it tells why the device does not touch the wall.
+    """
+
+    __slots__ = ("keeps_off", "key")
+
+    def __new__(cls, sentence: str, key: str = "", keeps_off: bool = False) -> Note:
+        note = super().__new__(cls, sentence)
+        note.key, note.keeps_off = key, keeps_off
+        return note
 
 
 class Rule(NamedTuple):
-    """A rule: the numbers of its sentence where a resolved scene breaks it, None where it holds."""
+    """A rule: the numbers of its sentence where a resolved scene breaks it, None where it holds.
+
+    ``key`` is what it speaks of; its name in braces is taken from what was found.
+    """
 
     broken: Callable[[Scene], Found | None]
+    key: str
     sentence: str
+    keeps_off: bool = False
 
 
 def _late(scene: Scene) -> Found | None:
@@ -121,7 +146,7 @@ def _pushed_away(scene: Scene) -> Found | None:
     held = hand and hand.stiffness and hand.rest != scene.device.position
     if wall is None or hand is None or held or scene.event or scene.others or _start_depth_m(scene) >= 0.0:
         return None
-    inward = -1.0 if wall.occupies == "below" else 1.0
+    inward = _inward(wall)
     value_N = getattr(hand.force, "value", 0.0)
     away = value_N * inward < 0.0 and scene.device.velocity * inward <= 0.0
     return {"force_N": value_N} if away else None
@@ -156,69 +181,177 @@ def _begins_deep(scene: Scene) -> Found | None:
     return {"depth_mm": depth_m * 1e3, "force_N": make_wall(scene.wall).held(depth_m)}
 
 
+def _not_held_there(scene: Scene) -> Found | None:
+    """Compares the way to the wall with where the hand's force, over its stiffness, holds the device in the end."""
+    hand, device, wall = scene.hand, scene.device, scene.wall
+    if hand is None or wall is None or hand_is_unmodelled(scene) or not hand.stiffness or not hand.force:
+        return None
+    moves = device.velocity or isinstance(hand.force, Sine) or scene.others or scene.noise or _wall_moves(scene)
+    if moves or _start_depth_m(scene) >= -_count_m(scene) or any(of(scene) is not None for of in _KEPT_OFF):
+        return None
+    way_m = (wall.position - hand.rest) * _inward(wall) - _count_m(scene)
+    reach_m = _inward_force_N(scene) / hand.stiffness
+    return {"way_mm": way_m * 1e3, "reach_mm": reach_m * 1e3} if way_m > reach_m else None
+
+
+def _pressed_deep(scene: Scene) -> Found | None:
+    """Compares what the wall gives at 2 cm with what the hand presses by there, less what its spring holds back.
+
+    A run that ends before the hand's damping has let the device come as far is not meant.
+    """
+    hand, wall = scene.hand, scene.wall
+    if hand is None or wall is None or hand_is_unmodelled(scene) or wall.stiffness < _SOFTEST_N_M:
+        return None
+    if _wall_moves(scene) or any("wall.stiffness" in (event.set or {}) for event in scene.event):
+        return None
+    law, force_N = make_wall(wall), _inward_force_N(scene)
+    farthest_m = force_N * scene.duration / hand.damping if hand.damping else math.inf
+
+    def is_pressed_to(depth_m: float) -> bool:
+        back_m = (wall.position - hand.rest) * _inward(wall) + depth_m
+        if (wall.position - scene.device.position) * _inward(wall) + depth_m > farthest_m:
+            return False
+        return force_N - hand.stiffness * back_m > law.held(depth_m)
+
+    if force_N <= 0.0 or not is_pressed_to(_DEEPEST_PRESSED_M):
+        return None
+    depth_m, beyond_m = _DEEPEST_PRESSED_M, 1e3
+    while beyond_m - depth_m > 1e-4 * depth_m:
+        middle_m = math.sqrt(depth_m * beyond_m)
+        depth_m, beyond_m = (middle_m, beyond_m) if is_pressed_to(middle_m) else (depth_m, middle_m)
+    stiffness = {"stiffness": wall.stiffness, "stiffness_N_mm": wall.stiffness / 1e3}
+    return {"depth_mm": depth_m * 1e3, "force_N": force_N, **stiffness}
+
+
+def _overwritten(scene: Scene) -> Found | None:
+    """Tells of the first two events of one tick of which the later takes away what the earlier did."""
+    rate = scene.clock.control_rate
+    did: dict[tuple[int, str], int] = {}
+    for index, event in enumerate(scene.event):
+        tick = math.ceil(event.at * rate - 1e-6)
+        keys = [f"dissipation.{event.element or 0}"] if event.swap else [*(event.set or {})]
+        for key in keys:
+            over = [what for at, what in did if at == tick and (what == key or what.startswith(f"{key}."))]
+            if over:
+                return {"what": over[0], "at_s": tick / rate, "tick": tick, "first": did[tick, over[0]]}
+        if event.swap and event.swap.name == NO_ELEMENT:  # those after it move up
+            did = {(at, what): by for (at, what), by in did.items() if not what.startswith("dissipation.")}
+        else:
+            did |= dict.fromkeys([(tick, key) for key in keys], index)
+    return None
+
+
+# Each tells by itself why the wall is not reached.
+_KEPT_OFF = (_pushed_by_nothing, _held_by_friction, _beyond_the_end, _out_of_reach, _pushed_away)
+
 RULES = (
-    Rule(_late, "The delay, {delay_s:g} s, is {ticks:.0f} ticks; is that the unit that was meant?"),
+    Rule(
+        _late,
+        "clock.round_trip_delay",
+        "The delay, {delay_s:g} s, is {ticks:.0f} ticks; is that the unit that was meant?",
+    ),
     Rule(
         _long,
+        "duration",
         "The run has {ticks:.3g} ticks, {duration_s:.6g} s, and its log holds them all; is that the unit that was "
         "meant?",
     ),
     Rule(
         _no_contact,
+        "dissipation",
         "Nothing is ever in contact, since there is no [wall]: elements of [[dissipation]] give no force unless they "
         'say acts = "always".',
     ),
     Rule(
         _never_answers,
+        "clock.round_trip_delay",
         "No force takes effect within the run, since clock.round_trip_delay is no shorter than duration.",
     ),
     Rule(
         _pushed_by_nothing,
+        "device",
         "Nothing moves the device: the hand has no force and no stretched spring, the device no velocity at the start, "
         "and it begins outside the wall. [hand.force] would push it, device.velocity throw it.",
+        keeps_off=True,
     ),
     Rule(
         _held_by_friction,
+        "friction.kinetic",
         "Dry friction of {friction_N:.3g} N holds the device, which the hand pushes by {push_N:.3g} N at most: it "
         "hardly moves. Is that the unit that was meant?",
+        keeps_off=True,
     ),
     Rule(
         _beyond_the_end,
+        "wall.position",
         "The wall is at {position_m:g} m; a run ends as diverged beyond {most_m:g} m (diverged_beyond), before the "
         "device is there. Is that the unit that was meant?",
+        keeps_off=True,
     ),
     Rule(
         _out_of_reach,
+        "wall.position",
         "The wall is never reached: it is {way_mm:.4g} mm away, and the hand's force and the speed at the start "
         "move the device by less than {reach_mm:.3g} mm.",
+        keeps_off=True,
     ),
     Rule(
         _pushed_away,
+        "hand.force.value",
         "The hand's force of {force_N:.3g} N drives the device away from the wall, which it does not touch; "
         "hand.force.value or wall.occupies may be the other way round.",
+        keeps_off=True,
     ),
     Rule(
         _ideal_accelerometer,
+        "acceleration",
         "An estimate reads an accelerometer that no table describes, so it is ideal: no noise, no counts, no delay. "
         "[accelerometer] gives it those of a real one.",
     ),
     Rule(
         _begins_deep,
+        "wall.position",
         "The device begins {depth_mm:.3g} mm deep in the wall, which throws it out with {force_N:.3g} N at once; "
         "device.position, wall.position or wall.occupies may be the other way round.",
+    ),
+    Rule(
+        _not_held_there,
+        "wall.position",
+        "The hand's force holds the device {reach_mm:.4g} mm from its spring's rest, and the wall is {way_mm:.4g} mm "
+        "from there: the device touches it in a swing at most.",
+        keeps_off=True,
+    ),
+    Rule(
+        _pressed_deep,
+        "wall.stiffness",
+        "The wall gives way by {depth_mm:.3g} mm to the hand's largest force, {force_N:.3g} N; is {stiffness:g} N/m, "
+        "which is {stiffness_N_mm:g} N/mm, the stiffness that was meant?",
+    ),
+    Rule(
+        _overwritten,
+        "event.{first}",
+        "Two events change {what} at {at_s:.6g} s (tick {tick}); only the later in the file counts.",
     ),
 )
 
 
-def note_unmeant(scene: Scene) -> list[str]:
+def note_unmeant(scene: Scene) -> list[Note]:
     """Returns a sentence for every rule that a resolved scene breaks, and for numbers that hardly any loop has."""
     unusual = [
-        f"{key} is {value:g} {unit}; is that the unit that was meant? Haptic loops have {least:g} to {most:g} {unit}."
+        Note(
+            f"{key} is {value:g} {unit}; is that the unit that was meant? "
+            f"Haptic loops have {least:g} to {most:g} {unit}.",
+            key,
+        )
         for key, least, most, unit in _USUAL
         if (value := value_at(scene, key)) and not least <= abs(value) <= most
     ]
-    broken = [(rule.sentence, rule.broken(scene)) for rule in RULES]
-    return unusual + [sentence.format(**found) for sentence, found in broken if found is not None]
+    broken = [(rule, rule.broken(scene)) for rule in RULES]
+    return unusual + [
+        Note(rule.sentence.format(**found), rule.key.format(**found), rule.keeps_off)
+        for rule, found in broken
+        if found is not None
+    ]
 
 
 def _most_force_N(scene: Scene) -> float:
@@ -229,6 +362,22 @@ def _most_force_N(scene: Scene) -> float:
     if isinstance(force, Trace):
         return max(map(abs, force.force))
     return abs(force.amplitude) + abs(force.offset) if isinstance(force, Sine) else abs(force.value)
+
+
+def _inward(wall: Wall) -> float:
+    return -1.0 if wall.occupies == "below" else 1.0
+
+
+def _inward_force_N(scene: Scene) -> float:
+    """Returns the largest force of the hand towards the wall; 0 where it has none."""
+    force = scene.hand.force if scene.hand else None
+    if force is None or scene.wall is None:
+        return 0.0
+    sign = _inward(scene.wall)
+    if isinstance(force, Trace):
+        return max(0.0, *(sign * each for each in force.force))
+    at_most_N = abs(force.amplitude) + sign * force.offset if isinstance(force, Sine) else sign * force.value
+    return max(0.0, at_most_N)
 
 
 def _start_depth_m(scene: Scene) -> float:

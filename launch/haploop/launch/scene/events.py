@@ -60,6 +60,12 @@ def check_events(
     return settings
 
 
+def in_order_of_time(events: Iterable[Tables]) -> list[int]:
+    """Returns the places of events in their file in the order in which they happen."""
+    times = [_read(event, "at") for event in events]
+    return sorted(range(len(times)), key=times.__getitem__)
+
+
 def _check_shape(layers: Layers, key: KeyPath, event: Tables, time: Timebase | None) -> None:
     verbs = [verb for verb in VERBS if event.get(verb) is not None]
     if len(verbs) != 1:

@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from haploop.launch.scene.check import resolve
+from haploop.launch.scene.events import in_order_of_time
 from haploop.launch.scene.layers import Layers, lay_overrides, read_layers
+from haploop.launch.scene.mistakes import COMMAND_LINE, shown
+from haploop.launch.scene.reading.lines import KeyPath, line_in
 from haploop.launch.scene.reading.shorthand import put_in_full
 from haploop.launch.scene.unmodelled import demand_modelled
 from haploop.protocol.scene.scene import Scene
@@ -54,3 +57,22 @@ def resolved(
         kinds = registry()
     scene = resolve(layers, kinds).in_order()
     return scene if any_hand else demand_modelled(layers, scene)
+
+
+def places(path: Path, overrides: Sequence[str], keys: Sequence[str]) -> list[str]:
+    """Returns where keys of the resolved scene of a file stand, ``FILE:LINE``; "" for one that stands in no file."""
+    layers = read_layers(path)
+    lay_overrides(layers, overrides)
+    return [_place(layers, key) for key in keys]
+
+
+def _place(layers: Layers, name: str) -> str:
+    key: KeyPath = tuple(int(part) if part.isdecimal() else part for part in name.split("."))
+    if key[0] == "event" and len(key) > 1:
+        key = ("event", in_order_of_time(layers.data["event"])[int(key[1])])
+    known = [*layers.origins, ("event",), ("dissipation",)]
+    while key and key not in known:
+        key = key[:-1]
+    origin = layers.origin(key)
+    line = None if origin == COMMAND_LINE or not key else line_in(origin, key)
+    return f"{shown(origin)}:{line}" if line else ""

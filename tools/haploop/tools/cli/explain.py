@@ -52,7 +52,7 @@ def explain(
         kinds = kinds_with(plugin or [])
         resolved = load(scene, set or [], kinds)
         try_out(elements_of(resolved), kinds)
-        notes = print_notes(resolved, kinds)
+        notes = print_notes(resolved, kinds, scene, set or [])
         planned = plan(resolved)
         costs = bill(resolved, planned.named, kinds) if cost else None
     if json:

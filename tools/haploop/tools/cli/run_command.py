@@ -96,7 +96,7 @@ def run(
         named = [f"title={inline(name)}"] if name else []
         prepared = start.prepare(scene, [*(set or []), *named], plugin or [], out, any_hand="plant" in programs)
         try:
-            noted = print_notes(prepared.scene, prepared.kinds)
+            noted = print_notes(prepared.scene, prepared.kinds, scene, set or [])
             # What an element prints is no part of the answer.
             with ProgressLine(prepared.scene.title, prepared.scene.duration) as line, redirect_stdout(sys.stderr):
 
@@ -131,7 +131,7 @@ def run(
         if json:
             print_json({**summary, "directory": str(prepared.out), "notes": noted})
         else:
-            print_summary(summary)
+            print_summary(summary, [note for note in noted if note.keeps_off])
             print(prepared.out)
         if summary["ended"] == "failed":
             leave(f"The run failed: {summary['why']}.", FAILED)

@@ -26,9 +26,10 @@ from haploop.tools.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from haploop.controller.dissipation import Element
+    from haploop.launch.plan.meant import Note
     from haploop.protocol.scene.scene import Scene
 
 # More samples of a recorded force than this are not printed to a terminal.
@@ -51,6 +52,7 @@ def check(
     json: Json = False,
 ) -> None:
     """Say what is wrong with a scene, or can hardly be meant."""
+    from haploop.launch.plan.effects import notes
     from haploop.launch.scene.file import load
     from haploop.launch.scene.schema import json_schema
     from haploop.launch.scene.toml_writer import to_toml
@@ -65,7 +67,7 @@ def check(
             raise typer.BadParameter("A scene file was expected, or --schema.")
         resolved = load(scene, set or [], kinds, any_hand=True)
     if json:
-        print_json({**resolved.as_dict(), "notes": print_notes(resolved, kinds)})
+        print_json({**resolved.as_dict(), "notes": print_notes(resolved, kinds, scene, set or [])})
     else:
         tables = resolved.as_dict()
         force = tables.get("hand", {}).get("force", {})
@@ -75,8 +77,11 @@ def check(
         print(to_toml(tables), end="", flush=True)
         with_a = " with a plant of yours (--node plant=COMMAND)" if hand_is_unmodelled(resolved) else ""
         no_wall = "" if resolved.wall else " It has no [wall]: nothing pushes the device back."
-        noted = " But see above what it can hardly mean." if print_notes(resolved, kinds) else ""
-        print(f"{scene} can be run{with_a}.{no_wall}{noted}", file=sys.stderr)
+        if notes(resolved, kinds):
+            print(file=sys.stderr)  # they are seen apart from all that is above
+        noted = print_notes(resolved, kinds, scene, set or [])
+        but = " But see above what it can hardly mean." if noted else ""
+        print(f"{scene} can be run{with_a}.{no_wall}{but}", file=sys.stderr)
 
 
 def plugins(plugin: Plugin = None, json: Json = False) -> None:
@@ -185,11 +190,18 @@ def print_note(note: str) -> None:
         print(f"Note: {note}", file=sys.stderr)
 
 
-def print_notes(scene: Scene, kinds: Mapping[str, type[Element]]) -> list[str]:
-    """Prints on stderr what in a resolved scene may not be what was meant, one line each; returns it."""
+def print_notes(
+    scene: Scene, kinds: Mapping[str, type[Element]], path: Path | None = None, overrides: Sequence[str] = ()
+) -> list[Note]:
+    """Prints on stderr what in a resolved scene may not be what was meant, one line each; returns it.
+
+    With the file it was read from, and what was laid over that, each begins with the file and line it speaks of.
+    """
     from haploop.launch.plan.effects import notes
+    from haploop.launch.scene.file import places
 
     found = notes(scene, kinds)
-    for note in found:
-        print_note(note)
+    where = places(path, overrides, [note.key for note in found]) if path and found else [""] * len(found)
+    for note, place in zip(found, where, strict=True):
+        print(f"{place}: Note: {note}" if place else f"Note: {note}", file=sys.stderr)
     return found

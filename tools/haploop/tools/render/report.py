@@ -11,6 +11,8 @@ from haploop.tools.render.terminal import console, make_facts, make_table, told,
 from haploop.tools.render.units import amount, fixed, parameters, spring
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from rich.console import RenderableType
     from rich.table import Table
 
@@ -54,12 +56,15 @@ def count_losses(summary: Summary) -> dict[str, int]:
     return {words: count for words, count in found.items() if count}
 
 
-def print_summary(summary: Summary) -> None:
-    console().print(summary_table(summary))
+def print_summary(summary: Summary, kept_off_by: Sequence[str] = ()) -> None:
+    console().print(summary_table(summary, kept_off_by))
 
 
-def summary_table(summary: Summary) -> RenderableType:
-    """Makes the report of a run from its summary: verdict, key numbers and every book of energy."""
+def summary_table(summary: Summary, kept_off_by: Sequence[str] = ()) -> RenderableType:
+    """Makes the report of a run from its summary: verdict, key numbers and every book of energy.
+
+    ``kept_off_by`` are sentences on why the device does not touch the wall, told where it did not.
+    """
     from rich.console import Group
     from rich.text import Text
 
@@ -72,6 +77,8 @@ def summary_table(summary: Summary) -> RenderableType:
     parts: list[RenderableType] = [head, Text(f"{rule[:1].upper()}{rule[1:]}.", style="dim")]
     if summary["verdict"] in SWINGS and (why := cause(summary["energy"])):
         parts.append(Text(f"Likely cause: {why}"))
+    if summary["verdict"] == "no-contact":
+        parts += map(Text, kept_off_by)
     if summary["ended"] not in ("done", "diverged"):
         why = f", since {summary['why'].rstrip('.')}" if summary["ended"] == "failed" and summary["why"] else ""
         parts.append(Text(f"ended early: {summary['ended']}{why}", style="bold red"))

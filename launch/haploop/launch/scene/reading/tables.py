@@ -31,7 +31,7 @@ def parse(
 
     Raises SceneError where it is missing, empty, no file, no text or no TOML (with line and column).
     """
-    text = ""
+    text, line = "", None
     try:
         text = read_text(path)
         try:
@@ -53,10 +53,19 @@ def parse(
     except UnicodeDecodeError as error:
         problem = f"A {what} must be UTF-8 text, but byte {error.start} is not."
     except ValueError as error:
+        line = _line_of(str(error), text)
         problem = f"This is not TOML: {error}.{_hint(str(error), text)} Other mistakes are told once it is."
     except RecursionError:
         problem = _TOO_DEEP
-    raise SceneError([Mistake(shown(path), "", "", problem)])
+    raise SceneError([Mistake(shown(path), "", "", problem, line=line)])
+
+
+def _line_of(problem: str, text: str) -> int | None:
+    """Returns the line that a sentence of tomllib's is about; None where it names none."""
+    if "at end of document" in problem:
+        return len(text.splitlines())
+    at = re.search(r"at line (\d+)", problem)
+    return int(at[1]) if at else None
 
 
 def _hint(problem: str, text: str) -> str:
