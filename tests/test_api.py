@@ -18,6 +18,7 @@ from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.spec import RunFailed
 from haploop.logger.summary import read as read_summary
 from haploop.tools.cli.app import app
+from haploop.tools.figure.data import FigureError
 from helpers.live.launched import PATIENCE_S, SCENES, wait_for
 from helpers.scenes.brake import source
 
@@ -64,6 +65,28 @@ def test_elements_on_a_recorded_motion_take_what_the_formula_says(tmp_path: Path
     assert damping.true_J == pytest.approx(2.0 * 0.1 * 0.1, rel=2e-3)
     assert dissipate(recording, damping=["0.002 N s/mm"]).elements[0].true_J == damping.true_J
 
+    assert dissipate(recording, damping=2.0).elements[0].true_J == damping.true_J
+    assert dissipate(recording, damping="2 N s/m").elements[0].true_J == damping.true_J
+    assert len(dissipate(recording, damping=np.array([1.0, 2.0])).elements) == 2
+
+
+def test_one_run_or_several_are_drawn_and_a_sweep_is_drawn_by_itself(tmp_path: Path) -> None:
+    scene = load("fig6c", SHORT)
+    one, other = (run(scene.set({"wall.stiffness": k}), tmp_path / str(k)) for k in (150, 200))
+    assert plot(one) == tmp_path / "150" / "figure.png"
+    assert plot([one, other], tmp_path / "both.svg").stat().st_size > 1000
+    with pytest.raises(FigureError, match="There is no run to draw"):
+        plot([])
+    with pytest.raises(ValueError, match="kept in memory alone"):
+        plot([one, run(scene)])
+
+
+def test_arrays_of_numpy_are_a_recorded_force() -> None:
+    times, forces = np.linspace(0.0, 0.2, 5), -np.ones(5)
+    scene = load("fig6c", {**SHORT, "hand.force": {"kind": "trace", "time": times, "force": forces}})
+    assert scene["hand.force.time"] == times.tolist()
+    assert scene.set({"hand.force.force": 2 * forces})["hand.force.force"] == [-2.0] * 5
+
 
 @pytest.mark.slow
 def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_scene(
@@ -75,20 +98,28 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
         other = attach(loop.id[:4])
         assert other.id == loop.id
         monkeypatch.chdir("/")  # a relative directory stays where it was
-        with pytest.raises(TimeoutError):
-            loop.wait(0.01)
+        for timeout_s in (0.01, None):
+            with pytest.raises(CommandRefused, match=r"paused at tick 0 and comes to no end by itself: resume\(\)"):
+                loop.wait(timeout_s)
+        for wrong in ("wall.stiffness", ["wall.stiffness=2 N/mm"]):
+            with pytest.raises(TypeError, match=r'set by key: set\(\{"wall.stiffness": 200\}\)'):
+                loop.set(wrong, 3)  # pyright: ignore[reportArgumentType]
+        with pytest.raises(ValueError, match=r"N is a force, but s is a time\."):
+            loop.swap("damping", at="2 N", damping=1.0)
         assert loop.step(100) == 100
         seen = loop.status()["status"]
         assert seen.get("verdict", "undecided") == "undecided"  # less than half a second of it
         with pytest.raises(CommandRefused, match="did you mean damping"):
             loop.swap("dampin", damping=1.0)
         tick = loop.swap("unidirectional-inertia", mass="10 g")
-        loop.set({"wall.stiffness": "0.2 N/mm"}, at=0.2)
+        loop.set({"wall.stiffness": "0.2 N/mm"}, at="200 ms")
         live = loop.finish()
         assert loop.wait() is live
         assert other.wait(PATIENCE_S).summary == live.summary
         with pytest.raises(RunNotFound):
             loop.pause()
+    with start("fig6b", pace=0.01) as slow, pytest.raises(TimeoutError, match="still goes on after 0.01 s"):
+        slow.wait(0.01)
     written = scene.swap("unidirectional-inertia", at=tick * 1e-3, mass=0.01).set({"wall.stiffness": 200}, at=0.2)
     assert live.summary["trajectory_sha256"] == run(written).summary["trajectory_sha256"]
     assert live.directory == tmp_path / "out"

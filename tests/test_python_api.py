@@ -137,6 +137,25 @@ def test_mistakes_are_the_sentences_of_the_command_line_all_at_once(scene: Scene
         run(scene, pace=1)
 
 
+def test_a_value_is_had_by_its_dotted_key(scene: Scene) -> None:
+    assert scene["wall.stiffness"] == scene["wall"]["stiffness"]
+    assert scene["dissipation.0.kind"] == "unidirectional-inertia"
+    assert "wall.stiffness" in scene
+    assert "dissipation.1" not in scene
+    with pytest.raises(KeyError, match=r"no stifness in wall \(did you mean stiffness\?\); it holds position"):
+        scene["wall.stifness"]
+    with pytest.raises(KeyError, match=r"no x in wall\.stiffness\."):
+        scene["wall.stiffness.x"]
+
+
+@pytest.mark.parametrize("at", [None, 0.1, 3])
+def test_values_that_are_not_given_by_key_are_refused_with_the_form_to_write(scene: Scene, at) -> None:
+    with pytest.raises(TypeError, match=r'Values are set by key: set\(\{"wall.stiffness": 200\}\)'):
+        scene.set("wall.stiffness", at)
+    with pytest.raises(TypeError, match="Values are set by key"):
+        load(FIG6C, "wall.stiffness=3")
+
+
 def test_a_directory_that_holds_something_is_refused(scene: Scene, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(OutputError, match="must be new or empty"):

@@ -66,7 +66,7 @@ def test_a_swap_may_add_one_past_the_end_and_none_moves_the_rest_up():
         ({"at": 0.5, "set": {"wall": {"stiffness": 1}}}, "event.0.set.wall is a table. Write the whole key in quotes"),
         ({"at": 0.5, "set": {"dissipation.0.acts": "always"}}, "event.0.set.dissipation.0.acts cannot be set."),
         ({"at": 0.5, "swap": DAMPING | {"damping": -1}}, "event.0.swap.damping is -1. It must be at least 0 N s/m."),
-        ({"at": 0.5, "swap": "damping"}, 'event.0.swap is "damping". It must be a table.'),
+        ({"at": 0.5, "swap": "damping"}, 'event.0.swap is "damping". It must be a table, such as { kind'),
     ],
 )
 def test_an_event_that_does_not_fit_is_one_sentence(event, sentence):

@@ -143,3 +143,30 @@ def test_what_stands_after_an_element_that_limits_is_noted_and_nothing_else_is()
     [note] = notes(scene(**thrown, dissipation=[bounding, damping]), KINDS)
     assert note.startswith("dissipation.0 (force-bounding) changes the force of the wall")
     assert "dissipation.1 (damping) stands after it" in note
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ('encoder = { bits = 4096, range = "0.2 m" }', "is 4096. It must be at most 64. 4096 counts are 12 bits."),
+        ('encoder = { bits = 4000, range = "0.2 m" }', '4000 counts over 0.2 m are resolution = "0.2 m / 4000".'),
+        ('wall.stiffness = "1 n/mm"', '"n/mm" is not a unit; did you mean N/mm?'),
+        ('wall.stiffness = "1 N/mm^2"', "N/mm^2 is a pressure, but N/m is a stiffness."),
+        ('clock.round_trip_delay = "1.55 ms"', 'is "1.55 ms". The round_trip_delay must be a whole number'),
+        ('clock.round_trip_delay = "1.55 ms"', "With clock.plant_rate = 20000 it is 31 whole steps."),
+        ('event = [{ at = 0.5, swap = "damping" }]', 'a table, such as { kind = "damping", damping = 0.8 }.'),
+        ('event = [{ at = 0.5, set = { "hand.stiffnes" = 3 } }]', "cannot be set. Nothing of [hand] changes in a run."),
+        ("actuator.continuous = 3.0", "the continuous force for walls that are pressed for long"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_quoted_as_it_was_written_with_what_would_do(tmp_path, wrong, told):
+    (tmp_path / "a.toml").write_text(f"{BASE}{wrong}\n")
+    with pytest.raises(SceneError) as caught:
+        load(tmp_path / "a.toml")
+    assert told in str(caught.value)
+
+
+def test_a_word_that_is_hardly_alike_is_not_offered(tmp_path):
+    (tmp_path / "a.toml").write_text(f'{BASE}event = [{{ at = 0.5, swap = {{ kind = "spring" }} }}]\n')
+    with pytest.raises(SceneError, match=r'swap\.kind is "spring"\. Allowed'):
+        load(tmp_path / "a.toml")

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+# Less alike than this is another word: "spring" and "damping" are 0.62.
+_ALIKE = 0.65
+
 
 def nearest(name: object, allowed: Iterable[str]) -> str | None:
     """Returns the allowed name closest to ``name``, if one is close."""
     import difflib
 
-    return next(iter(difflib.get_close_matches(str(name), list(allowed), n=1)), None)
+    return next(iter(difflib.get_close_matches(str(name), list(allowed), n=1, cutoff=_ALIKE)), None)
 
 
 def meant(name: object, allowed: Iterable[str]) -> str:

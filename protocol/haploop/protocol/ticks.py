@@ -147,8 +147,22 @@ def whole_count(seconds: float, rate: int, name: str, units: str, complaints: li
         complaints.append(
             f"{name} must be a whole number of {units} at {rate} Hz, but {seconds:g} s is {count:.6g} of them; "
             + (f"the nearest legal values are {named}." if len(legal) > 1 else f"the least legal value is {named}.")
+            + (_whole_at(seconds, rate) if units == "plant steps" else "")
         )
     return nearest
+
+
+# A plant rate is offered up to so many times the given one.
+_MOST_TIMES = 100
+
+
+def _whole_at(seconds: float, rate: int) -> str:
+    """Returns a sentence with the least multiple of a plant rate at which a time is whole steps; "" where none is."""
+    for times in range(2, _MOST_TIMES + 1):
+        count = seconds * rate * times
+        if abs(count - round(count)) <= _WHOLE_WITHIN:
+            return f" With clock.plant_rate = {rate * times} it is {round(count)} whole steps."
+    return ""
 
 
 def too_long(name: str, delay_s: float, control_rate: int) -> list[str]:

@@ -19,18 +19,31 @@ from numpy.typing import NDArray
 
 import haploop.logger
 from haploop.launch.processes import run_directory
-from haploop.launch.processes.run_directory import Elsewhere, LiveRun, RunNotFound, ask
-from haploop.launch.runs.loaded_scene import LoadedScene, load, plain
+from haploop.launch.processes.run_directory import CommandRefused, Elsewhere, LiveRun, RunNotFound, ask
+from haploop.launch.runs.loaded_scene import SET_SO, LoadedScene, load, plain
 from haploop.launch.runs.result import Result
+from haploop.launch.scene.number import Number
 from haploop.launch.spec import PLUGINS, SCENE, RunFailed
 from haploop.logger.log.recording import Recording
 from haploop.logger.session import LOG
 from haploop.logger.summary import SUMMARY
 from haploop.logger.summary import read as read_summary
+from haploop.protocol.quantity import Quantity
 
 _LOOK_S, _ENDS_WITHIN_S, _TOLD = 0.01, 20.0, "told.txt"
 # Simulated seconds per second of a run that is to stand still at its start: no tick after the first is due.
 _STANDING = 1e-6
+_PAUSED = (
+    "The run {0} is paused at tick {1} and comes to no end by itself: resume() lets it go on, finish() does, and waits "
+    "for its end."
+)
+
+_TIME = Number(Quantity("s", at_least=0, about="time"))
+
+
+def _seconds(at: Any) -> float | None:
+    """Returns a time given in s, as text with its unit or as a quantity of pint; None for none."""
+    return None if at is None else _TIME.read(plain(at))
 
 
 class _Started(NamedTuple):
@@ -151,29 +164,34 @@ class LiveLoop:
         """Returns tick, end, pace, whether it is paused, and every node, as ``haploop status --json``."""
         return self._ask("status")
 
-    def set(self, values: Mapping[str, Any], at: float | None = None) -> int:
+    def set(self, values: Mapping[str, Any], at: Any = None) -> int:
         """Changes numbers, ``{"wall.stiffness": "0.4 N/mm"}``, at once or at a simulated time; returns the tick.
 
-        What is in order then but may not be what was meant is told as a ``UserWarning``, as ``haploop check`` does.
+        The time is in s or text with its unit. What is in order then but may not be what was meant is told as a
+        ``UserWarning``, as ``haploop check`` does.
+
+        Raises:
+            TypeError: the values are not given by key.
         """
-        done = self._ask("set", set=plain(values), at=at)
+        if not isinstance(values, Mapping):
+            raise TypeError(SET_SO)
+        done = self._ask("set", set=plain(values), at=_seconds(at))
         for note in done.get("notes", ()):
             warnings.warn(note, stacklevel=2)
         return done["tick"]
 
-    def swap(
-        self, kind: str, *, element: int = 0, at: float | None = None, reload: bool = False, **parameters: Any
-    ) -> int:
-        """Replaces an element, at once or at a simulated time, s; returns the tick.
+    def swap(self, kind: str, *, element: int = 0, at: Any = None, reload: bool = False, **parameters: Any) -> int:
+        """Replaces an element, at once or at a simulated time; returns the tick.
 
         Args:
             kind: of the new element; "none" removes the one there is.
             element: counted from 0; one past the end adds one.
+            at: when, in s or text with its unit.
             reload: whether to load the kind's plugin file anew first.
             parameters: of the new element.
         """
         table = {"kind": kind, **plain(parameters)}
-        return self._ask("swap", swap=table, element=element, at=at, reload=reload)["tick"]
+        return self._ask("swap", swap=table, element=element, at=_seconds(at), reload=reload)["tick"]
 
     def undo(self) -> None:
         """Takes back the last swap or set."""
@@ -231,6 +249,7 @@ class LiveLoop:
 
         Raises:
             TimeoutError: it still goes on.
+            CommandRefused: it stands still when it is to be awaited, and comes to no end by itself.
             RunFailed: it could not go on.
             RunNotFound: it was one elsewhere, whose files are not on this machine.
         """
@@ -239,6 +258,9 @@ class LiveLoop:
             return self._result
         if not started and not run.is_here:
             raise RunNotFound(f"The run at {self.id} leaves its files on its own host; wait for its end there.")
+        with contextlib.suppress(RunNotFound):  # it has ended
+            if (now := self.status())["paused"]:
+                raise CommandRefused(_PAUSED.format(run.id, now["tick"]))
         give_up = math.inf if timeout_s is None else time.monotonic() + timeout_s
         while started.process.poll() is None if started else run_directory.has_launcher(run):
             if time.monotonic() > give_up:

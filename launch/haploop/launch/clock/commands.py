@@ -230,7 +230,8 @@ class Commands:
         words = " ".join(f'{key}="{value}"' if " " in value else f"{key}={value}" for key, value in were.items())
         self._undo_by.append((self._clock.newest, {"set": back}, None))
         known, kinds = notes(before, self._spec.kinds), self._spec.kinds
-        new = [note for note in notes(self._clock.scene_at(tick), kinds) if note not in known]
+        found = [note for note in notes(self._clock.scene_at(tick), kinds) if not note.key.startswith("event.")]
+        new = [note for note in found if note not in known]  # who sets a thing anew knows that it was set
         text = f"{what} from {self._at(tick)} on; to go back: set {words}"
         return "\n".join([text, *new]), {"tick": tick, "before": {"set": back}, "notes": new}
 

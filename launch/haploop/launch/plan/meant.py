@@ -330,7 +330,7 @@ RULES = (
     Rule(
         _overwritten,
         "event.{first}",
-        "Two events change {what} at {at_s:.6g} s (tick {tick}); only the later in the file counts.",
+        "Two events change {what} at {at_s:.6g} s (tick {tick}); only the later of the two counts.",
     ),
 )
 

@@ -20,6 +20,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Tables
 
 Values = Mapping[str, Any] | Iterable[str]
+SET_SO = 'Values are set by key: set({"wall.stiffness": 200}), in mid-run set({"wall.stiffness": "0.2 N/mm"}, at=0.5).'
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,12 +87,14 @@ class LoadedScene:
             SceneError: such a scene could not be run; it holds every mistake.
             ElementError: an element's own code does not take its parameters.
         """
+        if isinstance(values, str):
+            raise TypeError(SET_SO)
         if at is None:
             layers = Layers(self.path, self.tables)
             lay_overrides(layers, texts(values))
             return self._resolved(layers)
         if not isinstance(values, Mapping):
-            raise TypeError('What is set in mid-run must be given by key, such as {"wall.stiffness": 200}.')
+            raise TypeError(SET_SO)
         return self._with_event({"at": plain(at), "set": plain(values)}, "set")
 
     def swap(self, kind: str | type[Element], *, at: Any, element: int = 0, **parameters: Any) -> LoadedScene:
@@ -157,8 +160,10 @@ def texts(values: Values) -> list[str]:
     """Values as the command line takes them: ``KEY=VALUE``.
 
     Raises:
-        TypeError: a value is of a kind that no scene holds.
+        TypeError: a value is of a kind that no scene holds, or the values are one text.
     """
+    if isinstance(values, str):
+        raise TypeError(SET_SO)
     if isinstance(values, Mapping):
         return [f"{key}={inline(plain(value))}" for key, value in values.items()]
     return list(values)

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 _TAGGED = {("hand", "force"), ("jitter",), ("dissipation", 0), ("event", 0, "swap")}
 _SOME_S = 1.0
 _OWN_KIND = " An element of yours comes with --plugin FILE."
+_A_SWAP = 'It must be a table, such as { kind = "damping", damping = 0.8 }.'
 _FORMS = {
     "bool_type": "It must be true or false.",
     "string_type": "It must be text in quotes.",
@@ -146,7 +147,8 @@ def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:
         for sentence in str(error).splitlines():  # each begins with its key
             name = sentence.split()[0]
             key, value = (("clock", name), clock[name]) if name in clock else ((name,), duration)
-            layers.complain(key, f"The {sentence}", f"is {inline(value)}")
+            is_given = len(key) == 1 or key[1] in layers.data.get("clock", {})
+            layers.complain(key, f"The {sentence}", None if is_given else f"is {inline(value)}")
         return None
 
 
@@ -154,6 +156,10 @@ def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:
 _SAID_BY: dict[KeyPath, str] = {
     ("encoder", name): ' 4096 counts over 0.2 m are bits = 12 and range = "0.2 m", or resolution = "0.2 m / 4096".'
     for name in ("counts", "cpr", "ppr")
+} | {
+    ("actuator", name): " The force is cut off at saturation at every instant, however long: put there the peak force "
+    "for taps, the continuous force for walls that are pressed for long. Heat is not simulated."
+    for name in ("continuous", "continuous_force", "peak", "peak_force", "limit", "max", "max_force", "maximum")
 }
 
 
@@ -189,6 +195,8 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
             layers.complain(key, f"It must be a list of tables: [[{key[-1]}]], two pairs of brackets.", "is one table")
         case "model_type" | "model_attributes_type" | "dict_type" if _is_list_of_tables(layers.value(key)):
             layers.complain(key, f"It must be one table: [{key[-1]}], one pair of brackets.", "is a list of tables")
+        case "model_type" | "model_attributes_type" if key[-1] == "swap":
+            layers.complain(key, _A_SWAP)
         case _:
             layers.complain(key, _FORMS.get(what, f"{message}."))
 

@@ -124,7 +124,8 @@ def _setting(
         )
     elif name not in settable:
         no_wall = name.startswith("wall.") and "wall.position" not in settable
-        expected = f"{'The scene has no [wall]. ' * no_wall}Allowed at that time: {', '.join(settable)}."
+        fixed = "" if no_wall else _fixed(name, settable)
+        expected = f"{'The scene has no [wall]. ' * no_wall}{fixed}Allowed at that time: {', '.join(settable)}."
         layers.complain(key, expected, "cannot be set", _nearest_key(name, settable))
     else:
         try:
@@ -142,8 +143,17 @@ def _setting(
     return None
 
 
+def _fixed(name: str, settable: dict[str, Number]) -> str:
+    """Returns a sentence on the table of a key where it is one of a scene of which nothing changes in a run."""
+    table = name.partition(".")[0]
+    is_fixed = table != name and hasattr(Scene, table) and not any(key.startswith(f"{table}.") for key in settable)
+    return f"Nothing of [{table}] changes in a run. " if is_fixed else ""
+
+
 def _nearest_key(name: str, settable: dict[str, Number]) -> str | None:
     """Returns the key closest to ``name``: by its last part where the table is right, since long names begin alike."""
+    if _fixed(name, settable):
+        return None
     table, _, last = name.rpartition(".")
     names = {key.rpartition(".")[2]: key for key in settable if key.startswith(f"{table}.")}
     return names.get(nearest(last, names) or "") if names else nearest(name, settable)

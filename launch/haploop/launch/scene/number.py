@@ -10,6 +10,7 @@ import re
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cache, lru_cache
+from itertools import product
 from typing import Any, NoReturn
 
 from pydantic import GetJsonSchemaHandler
@@ -233,6 +234,8 @@ _QUANTITIES = {
     "[length]": "a length", "[mass]": "a mass", "[time]": "a time", "1 / [time]": "a rate",
     "[length] / [time]": "a speed", "[length] / [time] ** 2": "an acceleration",
     "[mass] / [time]": "a damping", "[mass] / [time] ** 2": "a stiffness",
+    "[length] ** 2": "an area", "[mass] / [length] / [time] ** 2": "a pressure",
+    "[length] ** 2 * [mass] / [time] ** 3": "a power", "dimensionless": "a bare number",
     "[length] * [mass] / [time] ** 2": "a force", "[length] ** 2 * [mass] / [time] ** 2": "a torque or an energy",
 }  # fmt: skip
 # Names that pint takes for another unit of the same dimension than is mostly meant by them.
@@ -279,10 +282,20 @@ _IN_WORDS = {
 }  # fmt: skip
 
 
+def _alike(name: str) -> list[str]:
+    """Returns the units that are written as a name is but for upper and lower case; itself where none is."""
+    return [name] if name in _UNITS else [sign for sign in _UNITS if sign.lower() == name.lower()] or [name]
+
+
 def _meant(unit: str, target: str) -> str | None:
-    """Returns the name of a unit of the dimension of ``target`` that comes nearest to a word that is none."""
+    """Returns the unit of the dimension of ``target`` that comes nearest to a text that is none."""
     if (wanted := _exact(target)) is None:
         return None
+    for names in product(*(_alike(name) for _, name, _ in _PARTS.findall(unit))):
+        written = iter(names)
+        text = re.sub(r"[^\W\d]\w*|%", lambda _: next(written), unit)  # noqa: B023  called at once
+        if (_exact(text) or ((),))[0] == wanted[0]:
+            return text
     signs = {**dict.fromkeys(_UNITS), **_IN_WORDS}
     alike = [name for name, sign in signs.items() if (_exact(sign or name) or ((),))[0] == wanted[0]]
     return nearest(unit, alike)

@@ -55,10 +55,16 @@ class Grip(Table):
     damping: Annotated[float, si("N s/m", "viscous damping", at_least=0)] = 0.0
 
 
+_SATURATION = (
+    "largest force to either side at every instant; of a data sheet the peak force for taps, the continuous force for "
+    "walls that are pressed for long: heat is not simulated"
+)
+
+
 class Actuator(Table):
     """The limits of the motor and its amplifier."""
 
-    saturation: Annotated[float | None, si("N", "largest force to either side", above=0)] = None
+    saturation: Annotated[float | None, si("N", _SATURATION, above=0)] = None
     bandwidth: Bandwidth | None = None
     resolution: Annotated[float | None, si("N", "one step of force", above=0)] = None
 

@@ -41,11 +41,22 @@ def _count_range(layers: Layers) -> None:
             [other] = {*names} - {name}
             layers.complain(("encoder", name), expected, "is missing", place=("encoder", other))
         except PydanticCustomError as error:
-            layers.complain(("encoder", name), error.message())
+            layers.complain(("encoder", name), error.message() + _of_a_count(name, encoder[name]))
     if "resolution" in encoder:
         layers.complain(("encoder", "resolution"), expected, "stands beside bits or range")
     count_m = read["range"] / 2 ** read["bits"] if len(read) == 2 else encoder.get("resolution", 1.0)
     layers.lay({"resolution": count_m}, layers.origin(("encoder",)), ("encoder",))
+
+
+_IN_BITS, _IN_COUNTS = " {0} counts are {1} bits.", ' {0} counts over 0.2 m are resolution = "0.2 m / {0}".'
+
+
+def _of_a_count(name: str, value: object) -> str:
+    """Returns how a number of counts, given for that of bits, is written; "" for any other value."""
+    if name != "bits" or not isinstance(value, int) or value <= 64:
+        return ""
+    bits = value.bit_length() - 1
+    return (_IN_BITS if value == 1 << bits else _IN_COUNTS).format(value, bits)
 
 
 def _read_recording(layers: Layers) -> None:
