@@ -166,9 +166,28 @@ def test_the_figure_has_a_panel_for_each_unit_of_what_elements_show(tmp_path):
     run_in_process(of, KINDS, out=tmp_path)
     (tmp_path / "scene.toml").write_text(to_toml(of.as_dict()))
     panels = [ax for part in make_figure(RunData.from_directory(tmp_path)).subfigs for ax in part.axes]
-    own_panels = [ax for ax in panels if "own columns" in ax.get_title("left")]
+    own_panels = [ax for ax in panels if "Own columns" in ax.get_title("left")]
     shown = {ax.get_ylabel(): ax.get_legend_handles_labels()[1] for ax in own_panels}
-    assert shown == {"speed (mm/s)": ["speed of element 0"], "ticks": ["ticks of element 0"]}
+    assert shown == {"speed (mm/s)": ["speed of brake"], "ticks": ["ticks of brake"]}
+    assert [ax.get_title("left") for ax in own_panels] == ["Own columns: speed", "Own columns: ticks"]
+
+
+def test_an_element_has_one_name_and_one_colour_in_all_panels_also_where_another_had_its_place(tmp_path):
+    brake = {"kind": "brake", "damping": 0.5}
+    event = [{"at": 0.1, "swap": brake, "element": 0}, {"at": 0.2, "swap": brake | {"damping": 0.7}, "element": 0}]
+    of = own([DAMPING, {"kind": "unidirectional-inertia", "mass": 0.01}], event=event)
+    run_in_process(of, KINDS, out=tmp_path)
+    (tmp_path / "scene.toml").write_text(to_toml(of.as_dict()))
+    panels = [ax for part in make_figure(RunData.from_directory(tmp_path)).subfigs for ax in part.axes]
+    lines = {ax.get_title("left"): {each.get_label(): each.get_color() for each in ax.lines} for ax in panels}
+    forces, speeds = lines["Force by part"], lines["Own columns: speed"]
+    for name in ("brake", "brake-2"):
+        assert speeds[f"speed of {name}"] == forces[name]
+        assert lines["Energy taken out of the device (given to it below 0)"][name] == forces[name]
+    [panel] = [ax for ax in panels if ax.get_title("left") == "Force by part"]
+    legend = panel.get_legend()
+    assert legend
+    assert {"damping", "unidirectional-inertia", "brake", "brake-2"} <= {text.get_text() for text in legend.get_texts()}
 
 
 def test_what_it_shows_must_be_a_field_of_its_memory():

@@ -153,13 +153,15 @@ def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:
 
 
 # What is said by other keys than data sheets say it by.
+_COUNTS = ' 4096 counts over 0.2 m are bits = 12 and range = "0.2 m", or resolution = "0.2 m / 4096".'
+_FORCE = (
+    " The force is cut off at saturation at every instant, however long: put there the peak force for taps, the continuous "
+    "force for walls that are pressed for long. Heat is not simulated."
+)
 _SAID_BY: dict[KeyPath, str] = {
-    ("encoder", name): ' 4096 counts over 0.2 m are bits = 12 and range = "0.2 m", or resolution = "0.2 m / 4096".'
-    for name in ("counts", "cpr", "ppr")
-} | {
-    ("actuator", name): " The force is cut off at saturation at every instant, however long: put there the peak force "
-    "for taps, the continuous force for walls that are pressed for long. Heat is not simulated."
-    for name in ("continuous", "continuous_force", "peak", "peak_force", "limit", "max", "max_force", "maximum")
+    **{("encoder", name): _COUNTS for name in ("counts", "cpr", "ppr")},
+    **{("actuator", name): _FORCE for name in ("continuous", "peak", "limit", "max")},
+    **{("actuator", f"{name}_force"): _FORCE for name in ("continuous", "peak", "max")},
 }
 
 

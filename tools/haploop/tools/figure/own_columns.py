@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,8 +17,10 @@ if TYPE_CHECKING:
 
     from haploop.tools.figure.data import Floats, RunData
 
-_MOST_PANELS = 3
+_MOST_PANELS, _MOST_NAMED = 3, 2
 _PREFIXED = {"J", "m", "m/s", "N", "s", "W"}
+# Of several columns of one element, which have its colour, in one panel.
+_DASHES = ("-", (0, (4, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
 _NAME = re.compile(r"dissipation\.(\d+)\.(\w+)")
 
 
@@ -32,25 +34,48 @@ def own_columns(run: RunData) -> dict[str, dict[str, Floats]]:
     return found
 
 
+class _Shown(NamedTuple):
+    """A column of one element while it was at work: its name, the number of the element's book, times and values."""
+
+    column: str
+    element: int
+    t_s: Floats
+    values: Floats
+
+
 def draw_own_columns(body: SubFigure, grid: GridSpec, row: int, run: RunData) -> None:
-    """Draws them over the whole run into a row of a grid of three columns; the first units, where there are more."""
-    shown = list(own_columns(run).items())[:_MOST_PANELS]
-    for place, (unit, columns) in enumerate(shown):
+    """Draws them over the whole run into a row of a grid of three columns; the first units, where there are more.
+
+    An element has its colour and its name as in the other panels.
+    """
+    for place, (unit, columns) in enumerate(list(own_columns(run).items())[:_MOST_PANELS]):
         ax = body.add_subplot(grid[row, place])
-        largest = [float(np.nanmax(np.abs(column), initial=0.0)) for column in columns.values()]
+        shown = [part for name, column in columns.items() for part in _by_element(run, name, column)]
+        largest = [float(np.nanmax(np.abs(part.values), initial=0.0)) for part in shown]
         factor, letter = prefix_for(largest) if unit in _PREFIXED else (1.0, "")
-        for number, (name, column) in enumerate(columns.items()):
-            label = "{1} of element {0}".format(*_parts(name))
-            line(ax, run.ticks_s, column / factor, label, style.element_colour(number), held=True)
+        names = list(dict.fromkeys(part.column for part in shown))
+        for part in shown:
+            label = f"{part.column} of {run.history.elements[part.element].name}"
+            look = {"linestyle": _DASHES[names.index(part.column) % len(_DASHES)]}
+            line(ax, part.t_s, part.values / factor, label, style.element_colour(part.element), held=True, **look)
         ax.set_xlim(*run.span_s)
         # One alone is named at its axis, too.
-        own_name = _parts(next(iter(columns)))[1] if len(columns) == 1 else ""
+        own_name = names[0] if len(names) == 1 else ""
         label = f"{own_name} ({letter}{unit})".lstrip() if unit else own_name
-        style.dress(ax, "Elements' own columns", "time (s)", label)
+        title = f"Own columns: {', '.join(names)}" if len(names) <= _MOST_NAMED else f"Own columns in {unit}"
+        style.dress(ax, title, "time (s)", label)
         style.legend(ax)
         mark_events([ax], run)
 
 
-def _parts(name: str) -> tuple[str, ...]:
-    """Returns the element's number and the column's own name, of a name such as ``dissipation.0.alpha``."""
-    return _NAME.fullmatch(name).groups()  # pyright: ignore[reportOptionalMemberAccess]
+def _by_element(run: RunData, name: str, column: Floats) -> list[_Shown]:
+    """Returns a column of the log, such as ``dissipation.0.alpha``, by the elements that wrote it."""
+    slot, own_name = _NAME.fullmatch(name).groups()  # pyright: ignore[reportOptionalMemberAccess]
+    ticks = np.rint(run.ticks_s * run.control_rate)
+    parts = []
+    for number, span in enumerate(run.history.elements):
+        for place, first, end in span.slots:
+            inside = (ticks >= first) & (ticks < end)
+            if place == int(slot) and np.isfinite(column[inside]).any():
+                parts.append(_Shown(own_name, number, run.ticks_s[inside], column[inside]))
+    return parts

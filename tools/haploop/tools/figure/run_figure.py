@@ -59,7 +59,7 @@ def make_figure(run: RunData) -> Figure:
     position_panel(position, run, run.span_s, "Position")
     force_panel(force, run, run.span_s, "Force by part")
     for ax in (position, force):
-        style.legend(ax)
+        style.legend(ax, spare=(*run.plant_forces_N, "total", "wall"))
         ax.axvspan(*close_s, color=style.CLOSE, alpha=0.5, zorder=0.5, linewidth=0)
     books = run.books()
     colours = style.OF_THE_PLANT | {"wall": style.WALL, TOGETHER: style.INK}

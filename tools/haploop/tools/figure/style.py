@@ -81,16 +81,18 @@ def plain_numbers(axis: Axis, at: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
     axis.set_tick_params(which="minor", length=0)
 
 
-def legend(ax: Axes, only: tuple[str, ...] = (), **where: Any) -> None:
+def legend(ax: Axes, only: tuple[str, ...] = (), spare: tuple[str, ...] = (), **where: Any) -> None:
     """Draws a small legend above the axes' right end, where no line can run through it, or where told to.
 
-    Entries that do not fit beside the title are left out; the colours are explained beside the books, too.
+    Entries that do not fit beside the title are left out, ``spare`` ones first, in their order; the colours are
+    explained beside the books, too.
     """
     named = [(handle, label) for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)]
     named = [(handle, label) for handle, label in named if label in only or not only]
     room = _ROOM_LETTERS - _TITLE_LETTER * len(ax.get_title(loc="left"))
     while not where and sum(len(label) + _HANDLE_LETTERS for _, label in named) > room:
-        named = named[:-1]
+        labels = [label for _, label in named]
+        del named[next((labels.index(label) for label in spare if label in labels), -1)]
     if named:
         handles, labels = zip(*named, strict=True)
         place = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": len(named), "frameon": False} | where
