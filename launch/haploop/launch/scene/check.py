@@ -155,8 +155,8 @@ def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:
 # What is said by other keys than data sheets say it by.
 _COUNTS = ' 4096 counts over 0.2 m are bits = 12 and range = "0.2 m", or resolution = "0.2 m / 4096".'
 _FORCE = (
-    " The force is cut off at saturation at every instant, however long: put there the peak force for taps, the continuous "
-    "force for walls that are pressed for long. Heat is not simulated."
+    " The force is cut off at saturation at every instant, however long: put there the peak force for taps, the "
+    "continuous force for walls that are pressed for long. Heat is not simulated."
 )
 _SAID_BY: dict[KeyPath, str] = {
     **{("encoder", name): _COUNTS for name in ("counts", "cpr", "ppr")},

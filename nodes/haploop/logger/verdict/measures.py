@@ -24,6 +24,14 @@ UNTOLD = {
     "changed": "The loop was changed at {at_s:g} s, within the window from {from_s:g} s on, "
     "which does not show it as it is now.",
 }
+_LIMIT_CYCLE = f"; a limit cycle swings at least {CROSSINGS} times, half as wide in the second half or wider."
+_RULES = {
+    "swings": "From {from_s:.6g} s on the position swung through the middle of its motion {times} times by more than "
+    "{swing_um:.3g} µm, in the second half {growth:.2f} times as wide as in the first" + _LIMIT_CYCLE,
+    "rests": "From {from_s:.6g} s on the position did not swing by more than {swing_um:.3g} µm to both sides of the "
+    "middle of its motion" + _LIMIT_CYCLE,
+    "untouched": "No tick from {from_s:.6g} s on was in contact.",
+}
 
 
 class Figures(NamedTuple):
@@ -111,12 +119,9 @@ class RunMeasures(NamedTuple):
         if diverged:
             return Verdict("diverged", f"{diverged}.")
         window = self.window
-        rule = (
-            f"From {window.figures.from_s:.6g} s on x crossed its trend line {window.crossings} "
-            f"times by more than {self.swing_m * 1e6:.3g} µm, its second half {window.growth:.2f} times as wide as its "
-            f"first; a limit cycle is at least {CROSSINGS} crossings and 0.5 times."
-            if window.touched
-            else f"No tick from {window.figures.from_s:.6g} s on was in contact."
+        known = {"from_s": window.figures.from_s, "times": window.crossings, "growth": window.growth}
+        rule = _RULES["untouched" if not window.touched else "swings" if window.crossings else "rests"].format(
+            **known, swing_um=self.swing_m * 1e6
         )
         if untold:
             return Verdict("undecided", untold if untold == UNTOLD["no tick"] else f"{untold} {rule}")

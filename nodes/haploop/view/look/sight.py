@@ -18,14 +18,14 @@ _REST, _RIPPLE, _LEAST_RIPPLE_N = 4.0, 0.02, 1e-3
 _WHY = {
     "settling": "Its numbers are those so far: no word before {window:g} s in one regime, since {begin}.",
     "no contact": "No tick of the last {window:g} s was in contact.",
-    "swinging": "In the last {seen:.3g} s the position crossed its trend line {crossings} times by more than "
-    "{swing_um:.3g} µm.",
-    "growing": "In the last {seen:.3g} s the position crossed its trend line {crossings} times, the second half "
-    "{growth:.2f} times as wide as the first.",
-    "dying away": "In the last {seen:.3g} s the position crossed its trend line {crossings} times, the second "
-    "half {growth:.2f} times as wide as the first.",
-    "moving": "In the last {seen:.3g} s the position moved by {width_um:.3g} µm and crossed its trend line "
-    "{crossings} times: a push of the hand, or a swing slower than can be told.",
+    "swinging": "In the last {seen:.3g} s the position swung through the middle of its motion {crossings} times "
+    "by more than {swing_um:.3g} µm.",
+    "growing": "In the last {seen:.3g} s the position swung through the middle of its motion {crossings} times, "
+    "the second half {growth:.2f} times as wide as the first.",
+    "dying away": "In the last {seen:.3g} s the position swung through the middle of its motion {crossings} times, "
+    "the second half {growth:.2f} times as wide as the first.",
+    "moving": "In the last {seen:.3g} s the position moved by {width_um:.3g} µm and swung through the middle "
+    "of its motion {crossings} times: a push of the hand, or a swing slower than can be told.",
     "force ripples": "The position rests, but in the last {window:g} s the force rippled by {ripple_N:.3g} N.",
     "no swing seen": "In the last {seen:.3g} s the position stayed within {width_um:.3g} µm, the force within "
     "{ripple_N:.3g} N. This says nothing of stability.",

@@ -36,7 +36,7 @@ _COUNTS = (
     ("accelerometer", "clipped_ticks", "readings clipped"),
 )
 # The causes of a wall's leak by their keys in the summary.
-HELD, LAW_TAKES = "held by the wall if ideal", "taken by its law"
+HELD, LAW_TAKES = "stored by an ideal wall at the end", "taken by its law"
 # The damping of a wall goes by the estimated velocity.
 _OF_DAMPING = {"quantisation_J": "quantisation and estimates"}
 LEAK_CAUSES = {"sampling_and_hold_J": "sampling and hold", "quantisation_J": "quantisation", "delay_J": "delay"}
