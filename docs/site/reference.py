@@ -206,7 +206,8 @@ _LOG = (
     "A log is [MCAP](https://mcap.dev) with msgpack messages: `/plant` at every plant step (a message a tick, an "
     "array of its steps; `force` acts from that step on), `/controller` and `/energy` at every tick, `/events` for "
     "what changed. "
-    "`haploop.api.read(directory)` gives NumPy arrays by channel and column, `.frame()` a pandas frame (with the extra `pandas`); "
+    "`haploop.api.read(directory)` gives NumPy arrays by channel and column, `.frame()` a pandas frame (with the "
+    "extra `pandas`); "
     '`run.log = "ticks"` leaves out `/plant`, `"none"` all of it. The columns are those of a run of `all_effects`.'
 )
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import haploop.logger
 from haploop.launch.plan.meant import RULES, note_unmeant
 from haploop.launch.runs.in_process import run_in_process
-from haploop.launch.scene.file import load
+from haploop.launch.scene.file import load, places
 from haploop.launch.scene.mistakes import SceneError
 from haploop.tools.cli.app import app
 from helpers.scenes.least import KINDS, LEAST_TOML, WALL, scene
@@ -162,6 +162,12 @@ def test_a_note_names_the_line_it_speaks_of_whatever_file_that_is_in_and_none_of
     assert f"{mine}:5: Note: wall.stiffness is 3 N/m" in told
     assert f"{mine}:6: Note: Two events change wall.stiffness at 0.5 s" in told
     assert "\nNote: noise.deviation is 1 m" in told
+
+
+def test_keys_of_a_file_that_has_gone_stand_nowhere(tmp_path):
+    assert places(tmp_path / "gone.toml", [], ["wall.position", "event.1"]) == ["", ""]
+    (tmp_path / "other.toml").write_text(LEAST_TOML)
+    assert places(tmp_path / "other.toml", [], ["wall.position", "event.1"]) == ["", ""]
 
 
 def test_a_second_swap_of_one_tick_is_noted_unless_the_first_removed_what_stood_there():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import in_order_of_time
 from haploop.launch.scene.layers import Layers, lay_overrides, read_layers
-from haploop.launch.scene.mistakes import COMMAND_LINE, shown
+from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError, shown
 from haploop.launch.scene.reading.lines import KeyPath, line_in
 from haploop.launch.scene.reading.shorthand import put_in_full
 from haploop.launch.scene.unmodelled import demand_modelled
@@ -60,8 +60,14 @@ def resolved(
 
 
 def places(path: Path, overrides: Sequence[str], keys: Sequence[str]) -> list[str]:
-    """Returns where keys of the resolved scene of a file stand, ``FILE:LINE``; "" for one that stands in no file."""
-    layers = read_layers(path)
+    """Returns where keys of the resolved scene of a file stand, ``FILE:LINE``; "" for one that stands in no file.
+
+    A file that has gone, or is another by now, has none of them.
+    """
+    try:
+        layers = read_layers(path)
+    except SceneError:
+        return [""] * len(keys)
     lay_overrides(layers, overrides)
     return [_place(layers, key) for key in keys]
 
@@ -69,9 +75,9 @@ def places(path: Path, overrides: Sequence[str], keys: Sequence[str]) -> list[st
 def _place(layers: Layers, name: str) -> str:
     key: KeyPath = tuple(int(part) if part.isdecimal() else part for part in name.split("."))
     if key[0] == "event" and len(key) > 1:
-        key = ("event", in_order_of_time(layers.data["event"])[int(key[1])])
-    known = [*layers.origins, ("event",), ("dissipation",)]
-    while key and key not in known:
+        places_in_file = in_order_of_time(layers.data.get("event", []))[int(key[1]) :]
+        key = ("event", *places_in_file[:1])
+    while key and key not in layers.origins and not (len(key) == 2 and key[:1] in layers.origins):
         key = key[:-1]
     origin = layers.origin(key)
     line = None if origin == COMMAND_LINE or not key else line_in(origin, key)

@@ -63,12 +63,11 @@ Device = Annotated[
         help="a device that comes with haploop, or a scene",
         show_default=False,
         autocompletion=complete("devices"),
-        callback=told("devices"),
     ),
 ]
 Hand = Annotated[
     str | None,
-    typer.Option(metavar="HAND", help=_A_HAND, autocompletion=complete("hands"), callback=told("hands")),
+    typer.Option(metavar="HAND", help=_A_HAND, autocompletion=complete("hands")),
 ]
 Delay = Annotated[str | None, typer.Option(metavar="TIME", help='round trip, s or "2 ms"')]
 Estimator = Annotated[
