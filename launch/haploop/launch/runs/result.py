@@ -88,7 +88,7 @@ class Result:
         """
         if "stability" not in self.summary:
             return (_SEEN,) if self.verdict == "steady" else ()
-        return tuple(self.summary["stability"]["provisos"])
+        return tuple(self.summary["stability"].get("provisos", ()))
 
     def quantity(self, key: str) -> pint.Quantity[float]:
         """A number of the summary with its unit, by dotted key: ``"window.oscillation_m"``, ``"energy.moved_J"``.
