@@ -28,7 +28,7 @@ def test_a_verdict_is_a_word_a_shape_of_its_own_and_a_colour(stand_in, open_page
     grounds = set()
     words = ("steady", "limit-cycle", "growing", "diverged", "no-contact", "undecided")
     for word in words:
-        stand_in.state(**ENDED | {"verdict": word})
+        stand_in.state(**ENDED | {"verdict": word, "sight": RUNNING["sight"] | {"word": "no swing seen"}})
         expect(page.locator("#verdict span")).to_have_text(word)
         assert page.get_attribute("#verdict use", "href") == f"#verdict-{word}"
         still(page)
@@ -65,7 +65,7 @@ def test_what_the_window_sees_is_an_outline_and_says_that_nothing_is_known_of_st
         expect(page.locator("#verdict span")).to_have_text(told)
         expect(page.locator("#summary-title")).to_have_text(f"Ended: {told}")
         assert style(page, "borderTopStyle") != "none"
-    for word, told in (("dying away", "last seen: dying away"), ("no swing seen", "")):
+    for word, told in (("dying away", "still swings by 5.35 mm, dying away"), ("no swing seen", "")):
         stand_in.state(**ENDED | {"verdict": "steady", "sight": sight | {"word": word}})
         expect(page.locator("#verdict span")).to_have_text("steady")
         expect(page.locator("#seen")).to_have_text(told)
@@ -76,6 +76,30 @@ def test_what_the_window_sees_is_an_outline_and_says_that_nothing_is_known_of_st
     stand_in.state(**ENDED | {"summary": None, "verdict_is": "unknown", "why": "Its summary cannot be read."})
     expect(page.locator("#verdict span")).to_have_text("not known")
     expect(page.locator("#notice")).to_contain_text("Its summary cannot be read.")
+
+
+def test_no_verdict_of_steady_stands_alone_beside_what_moves_still(stand_in, page):
+    sight = RUNNING["sight"] | {"word": "settling", "from_s": 2.85, "to_s": 3.0, "so_far": True}
+    stability = {"provisos": ["only friction holds it"]}
+    ended = ENDED | {"verdict": "steady", "summary": SUMMARY | {"verdict": "steady", "stability": stability}}
+    for word, told in (
+        ("swinging", "only friction holds it, still swings by 5.35 mm"),
+        ("moving", "only friction holds it, still moves by 5.35 mm"),
+        ("force ripples", "only friction holds it, force still ripples by 410 mN"),
+    ):
+        stand_in.state(**ended | {"sight": sight | {"so_far_word": word}})
+        expect(page.locator("#seen")).to_have_text(told)
+        assert page.get_attribute("#verdict use", "href") != "#verdict-steady"
+    stand_in.state(**ended | {"sight": sight | {"so_far_word": "no swing seen"}})
+    expect(page.locator("#seen")).to_have_text("only friction holds it")
+    expect(page.locator("#verdict use")).to_have_attribute("href", "#verdict-steady")
+
+
+def test_the_force_that_ripples_in_the_run_and_that_of_its_pushed_copies_are_told_apart(stand_in, page):
+    window = {"window": {"force_ripple_N": 0.2}}
+    stand_in.state(**ENDED | {"summary": SUMMARY | window | {"stability": SUMMARY["stability"] | {"force_ripple_N": 0.0}}})
+    expect(page.locator("#summary")).to_contain_text("pushed, it ripples0 N above 30 Hz")
+    expect(page.locator("#summary")).to_contain_text("its own force ripples200 mN above 30 Hz")
 
 
 @pytest.mark.slow

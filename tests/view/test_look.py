@@ -79,6 +79,14 @@ def test_before_half_a_second_in_one_regime_there_is_no_word():
     assert seen(arrives, end=2600).word == "no contact"
 
 
+def test_a_swing_that_has_no_word_yet_is_told_from_what_rests():
+    swings = seen(sine(41.0, 1e-3), since=2850)
+    assert (swings.word, swings.so_far_word) == ("settling", "swinging")
+    assert swings.oscillation_m == pytest.approx(2e-3, rel=0.1)
+    assert seen(deep, since=2850).so_far_word == "no swing seen"
+    assert seen(deep, lambda t: 0.1 + 0.05 * np.sin(300 * t), since=2850).so_far_word == "force ripples"
+
+
 def test_what_bounces_on_and_off_the_wall_is_one_regime():
     assert seen(lambda t: 2e-3 * np.sin(2 * np.pi * 8.0 * t)).word == "swinging"
 

@@ -39,6 +39,7 @@ class Sight:
 
     Attributes:
         word: a key of the rules; ``why`` is a sentence.
+        so_far_word: what the word would be if the interval were a whole window; "" where nothing can be told.
         from_s, to_s: the interval that was looked at.
         so_far: whether the interval is shorter than a window, so that no word is told yet.
         oscillation_m, ripple_N: widths of position and of applied force about their straight trends, peak to peak.
@@ -57,6 +58,7 @@ class Sight:
     frequency_Hz: float | None = None
     stiffness_N_m: float | None = None
     force_swing_N: float | None = None
+    so_far_word: str = ""
 
 
 def window_ticks(rate: int) -> int:
@@ -101,9 +103,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     if fast >= CROSSINGS:
         crossings, growth, seen_s = fast, fast_growth, (end - first) / rate
     width, ripple = float(np.ptp(slow)), float(np.ptp(_flat(force)))
-    if so_far:
-        word = "settling"
-    elif not inside[-window:].any():
+    if not inside[-window:].any():
         word = "no contact"
     elif crossings >= CROSSINGS:
         word = "dying away" if growth < _DIES else "growing" if growth > _GROWS else "swinging"
@@ -112,6 +112,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     else:
         most = max(_LEAST_RIPPLE_N, _RIPPLE * float(np.abs(force).max()))
         word = "force ripples" if ripple > most else "no swing seen"
+    so_far_word, word = word, "settling" if so_far else word
     line = main_line(slow, rate) if width > 2.0 * swing_m else None
     line = line or (main_line(history.steps.rows(("force",), long_first, end)[0][::n], rate) if ripple else None)
     why = _WHY[word].format(
@@ -121,7 +122,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     return Sight(
         word, why, first / rate, end / rate, so_far, float(np.ptp(_flat(x))), ripple,
         line.frequency_Hz if line else None, stiffness if inside[first - end :].any() else None,
-        float(np.ptp(force)),
+        float(np.ptp(force)), so_far_word,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ const SIGNS = {
   swinging: "limit-cycle", growing: "growing", "force ripples": "limit-cycle", "no contact": "no-contact",
   "not finite": "diverged",
 };
+const SWINGS = new Set(["swinging", "growing", "dying away"]);
 const NOT_YET = { awaited: "being judged", unknown: "not known" };
 
 /** What there is of a verdict, in a word. */
@@ -46,20 +47,27 @@ function showVerdict(state) {
   const { sight, verdict_is: is } = state;
   const word = isJudged(state) ? state.verdict : is in NOT_YET ? "" : SIGNS[sight?.word];
   const known = VERDICTS.has(word) ? word : "none";
+  const still = isJudged(state) ? moved(state) : "";
   const sought = byId("verdict");
   sought.dataset.verdict = known;
-  sought.toggleAttribute("data-proviso", isJudged(state) && !!state.summary?.stability?.provisos?.length);
+  const provisos = isJudged(state) ? (state.summary?.stability?.provisos ?? []) : [];
+  sought.toggleAttribute("data-proviso", provisos.length > 0 || still !== "");
   sought.dataset.is = isJudged(state) ? "judged" : (is ?? "seen");
   sought.title = (isJudged(state) ? state.verdict_rule : sight?.why) ?? "";
-  put(byId("seen"), isJudged(state) ? beside(state) : is in NOT_YET ? "" : seen(sight));
-  sign(sought, `verdict-${known}`, told(state) || "no verdict");
+  put(byId("seen"), isJudged(state) ? [...provisos, still].filter(Boolean).join(", ") : is in NOT_YET ? "" : seen(sight));
+  sign(sought, `verdict-${still && known === "steady" ? "limit-cycle" : known}`, told(state) || "no verdict");
 }
 
-/** What has to be said in the same breath as the verdict. */
-const beside = (state) => state.summary?.stability?.provisos?.join(", ") || moved(state);
-
-/** What is seen still where a loop is judged steady, or not to be judged: a swing that dies away is in the picture. */
-const moved = ({ verdict, sight }) => (["steady", "undecided"].includes(verdict) && (sight?.word in SIGNS || sight?.word === "dying away") ? `last seen: ${sight.word}` : "");
+/** What the picture shows still where a loop is judged steady, or not to be judged. */
+function moved({ verdict, sight }) {
+  if (!["steady", "undecided"].includes(verdict) || !sight) return "";
+  const { oscillation_m: width, ripple_N: ripple } = sight;
+  const word = sight.so_far_word || sight.word;
+  if (word === "force ripples") return `force still ripples by ${amount(ripple, "N")}`;
+  if (word === "moving") return `still moves by ${amount(width, "m")}`;
+  if (SWINGS.has(word)) return `still swings by ${amount(width, "m")}${word === "swinging" ? "" : `, ${word}`}`;
+  return word in SIGNS ? `last seen: ${word}` : "";
+}
 
 /** Of when a word is: of how much of the half second that it takes, or of which. */
 function seen(sight) {

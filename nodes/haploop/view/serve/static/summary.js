@@ -33,7 +33,7 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
     "pushed, it swings":
       found.width_m < 1e-9 ? "less than 1 nm" : `${amount(found.width_m, "m")} ± ${amount(found.spread_m, "m", 2)}`,
     "that is": [...how, found.chaotic && "chaotic"].filter(Boolean).join(", "),
-    "its force ripples by": `${amount(found.force_ripple_N, "N")} above 30 Hz`,
+    "pushed, it ripples": `${amount(found.force_ripple_N, "N")} above 30 Hz`,
     growth: `${fixed(rate)} ± ${fixed(error, 2)} 1/s`,
     ...(isNumber(found.settles_s) ? { "settles within": `${amount(found.settles_s, "s")}, to 5 %` } : {}),
     ...(found.blown ? { [`after a blow of ${amount(found.blow_N, "N")}`]: found.blown } : {}),
@@ -44,10 +44,12 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
 
 const share = (own) => (own < 0.01 ? "less than 1 %" : `${Math.round(100 * own)} %`);
 
-function figures({ duration_s, ended, extremes = {}, real_time_factor: factor, lost = {} }) {
+function figures({ duration_s, ended, extremes = {}, window = {}, real_time_factor: factor, lost = {} }) {
   return {
     ran: `${isNumber(duration_s) ? fixed(duration_s, 4) : NONE} s, ${HOW[ended] ?? ended}`,
     "position from": `${amount(extremes.x_min_m, "m")} to ${amount(extremes.x_max_m, "m")}`,
+    // That of the run itself: noise and the hand, which the pushed copies have not, are in it.
+    ...(isNumber(window.force_ripple_N) ? { "its own force ripples": `${amount(window.force_ripple_N, "N")} above 30 Hz` } : {}),
     "largest force": amount(extremes.force_max_N, "N"),
     "real time": isNumber(factor) ? `${fixed(factor)}×` : NONE,
     "commands lost, dropped": `${lost.commands_lost ?? 0}, ${lost.commands_dropped ?? 0}`,
