@@ -217,6 +217,26 @@ def test_three_clicks_are_one_swap(stand_in, page):
     expect(page.locator("#swap-do")).to_be_disabled()
 
 
+def test_clicks_that_follow_the_answer_of_a_swap_are_no_second_one(stand_in, page):
+    page.locator("#swap-do").evaluate("""async button => {
+        for (let i = 0; i < 3; i++) {
+            button.click();
+            await new Promise(done => setTimeout(done, 60));
+        }
+    }""")
+    expect(page.locator("#said")).to_have_text("done")
+    assert len(stand_in.commands()) == 1
+    expect(page.locator("#swap-do")).to_be_enabled()  # for the next swap
+
+
+def test_the_form_of_a_run_without_elements_offers_the_first_kind_whatever_was_chosen_for_the_last_run(stand_in, page):
+    page.select_option("#swap-kind", "unidirectional-inertia")
+    page.select_option("#swap-acts", "always")
+    stand_in.state(run="another", options={**OPTIONS, "elements": []})
+    expect(page.locator("#swap-element option")).to_have_count(1)
+    assert [page.input_value(f"#swap-{name}") for name in ("kind", "acts")] == ["damping", "in-contact"]
+
+
 @pytest.mark.slow
 def test_the_form_of_the_next_run_starts_from_its_own_element(stand_in, page):
     page.select_option("#swap-element", "1")

@@ -4,6 +4,8 @@ import { byId, make, put } from "./dom.js";
 import { Field, firstWrong, refuse } from "./field.js";
 
 const REMOVE = "none";
+// After a swap the next one waits so long, or until the form has been changed.
+const LOCKED_MS = 700;
 
 export class SwapForm {
   /** @param {import("./steering.js").Steering} steering carries the order. */
@@ -13,9 +15,13 @@ export class SwapForm {
     this.elements = [];
     this.known = "";
     this.fields = [];
+    this.locked = 0;
     // What people have begun to choose stays while the run goes on; else the form follows the elements at work.
     this.isBegun = false;
-    byId("swap").addEventListener("input", () => (this.isBegun = true));
+    byId("swap").addEventListener("input", () => {
+      this.isBegun = true;
+      if (this.locked) this.unlock();
+    });
     byId("swap-element").addEventListener("change", () => this.takeElement());
     byId("swap-kind").addEventListener("change", () => this.takeKind());
     byId("swap").addEventListener("submit", (event) => {
@@ -34,7 +40,8 @@ export class SwapForm {
     choices("swap-element", [...names, [String(this.elements.length), `${this.elements.length}: add one`]]);
     this.offerKinds();
     if (isFirst) {
-      byId("swap-element").value = "0";
+      // What was chosen for another run stays no longer.
+      for (const id of ["swap-element", "swap-kind", "swap-acts"]) byId(id).selectedIndex = 0;
       this.takeElement();
     }
     else if (!this.isBegun) this.takeElement();
@@ -80,7 +87,7 @@ export class SwapForm {
     this.isBegun = false;
   }
 
-  /** One order at a time: three clicks are one swap. */
+  /** One order at a time: three clicks are one swap, however long they take one after the other. */
   async swap() {
     if (byId("swap-do").disabled) return;
     put(byId("swap-problem"), "");
@@ -90,9 +97,15 @@ export class SwapForm {
     const table = kind === REMOVE ? { kind } : { kind, acts: byId("swap-acts").value, ...values };
     byId("swap-do").disabled = true;
     const answer = await this.steering.order("swap", { swap: table, element: this.index }, { quiet: true });
-    byId("swap-do").disabled = false;
     this.isBegun = !answer.ok;
     if (!answer.ok) refuse(answer.text, this.fields, byId("swap-problem"));
+    this.locked = setTimeout(() => this.unlock(), answer.ok ? LOCKED_MS : 0);
+  }
+
+  unlock() {
+    clearTimeout(this.locked);
+    this.locked = 0;
+    byId("swap-do").disabled = false;
   }
 }
 
