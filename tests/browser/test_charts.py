@@ -100,7 +100,8 @@ def test_the_numbers_of_an_axis_leave_its_label_alone_however_large_they_are(sta
     alone = label(-0.008, "−8.000")
     assert len(set(alone.split(","))) > 2, "there is a label"
     assert label(-0.9, "−900.000") == alone
-    assert label(-80.0, "−80.000") != alone, "now it is J"
+    assert label(-1.67, "−1.670") != alone, "now it is J"
+    assert label(-80.0, "−80.000") != alone
     assert label(-8e6, "−8.000") != alone
 
 

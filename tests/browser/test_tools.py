@@ -146,3 +146,27 @@ def test_a_choice_stands_at_what_it_is_and_has_no_slider(stand_in, page):
     expect(page.locator("#swap-on")).to_have_value("true")
     expect(page.locator("#set-do")).to_be_disabled()
     expect(page.locator("#set input[type=range]")).to_have_count(1)
+
+
+def test_the_axis_of_a_spectrum_is_in_the_unit_of_its_title_and_begins_at_zero(stand_in, page):
+    def axes():
+        return page.evaluate("""() => [...document.querySelectorAll('#spectrum canvas')].map(canvas => {
+            const ratio = canvas.width / canvas.clientWidth;
+            return canvas.getContext("2d").getImageData(0, 0, 18 * ratio, canvas.height).data.join();
+        })""")
+
+    def show(width_m, told):
+        heights = [width_m / 2 if i == 30 else 0.0 for i in range(500)]
+        spectrum = table("spectrum", 1.0, 1.0, ("x", "m", "position", heights), ("force", "N", "force", heights))
+        line = {"frequency_Hz": 31.0, "width": width_m}
+        lines = {"x": line, "force": line, "from_s": 0.0, "to_s": 2.0}
+        stand_in.show(with_header(snapshot(0.0, 2.0, spectrum), lines=lines))
+        expect(page.locator("#spectrum .line-name").first).to_contain_text(told)
+        stand_in.drawn()
+        return axes()
+
+    page.click("[data-panel=spectrum]")
+    small = show(3e-4, "300 µm")
+    assert show(9e-4, "900 µm") == small
+    large = show(4e-3, "4.00 mm")
+    assert large[0] != small[0], "now it is mm"

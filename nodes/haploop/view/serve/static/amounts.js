@@ -59,6 +59,9 @@ export function axisNumbers(splits, step) {
   return splits.map((value) => (value === 0 ? "0" : power(value, digits).replace("e+", "e")));
 }
 
+/** What stands along an axis: a quantity with its unit, or the one that there is. */
+export const named = (label, unit) => (label && unit ? `${label} (${unit})` : label || unit || "pure number");
+
 /** Name, version and command of a program that is not haploop's own, as far as it told them. */
 export function programName({ name, version, command }) {
   const named = [name, version].filter(Boolean).join(" ") || "a program without a name";

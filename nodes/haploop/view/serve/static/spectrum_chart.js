@@ -1,7 +1,8 @@
 // The spectrum of force and position: amplitudes over frequency on two axes, the line that stands out named.
 
-import { amount, axisNumbers } from "./amounts.js";
+import { amount, axisNumbers, named } from "./amounts.js";
 import { bottomAxis, leftAxis } from "./axes.js";
+import { ClimbingUnit } from "./climbing.js";
 import { make, put, seldom } from "./dom.js";
 import { colour } from "./palette.js";
 import { line as linePath } from "./paths.js";
@@ -9,8 +10,8 @@ import { Range, extent } from "./range.js";
 import { scaled, times } from "./snapshot.js";
 
 const SIDES = {
-  x: { label: "position", unit: "m", axis: "position (µm)", factor: 1e6, colour: "accent", least: 0.1 },
-  force: { label: "applied force", unit: "N", axis: "force (mN)", factor: 1e3, colour: "ink", least: 0.1 },
+  x: { label: "position", axis: "position", unit: "m", prefix: "µ", colour: "accent", least: 1e-7 },
+  force: { label: "applied force", axis: "force", unit: "N", prefix: "m", colour: "ink", least: 1e-4 },
 };
 
 export class SpectrumChart {
@@ -28,7 +29,8 @@ export class SpectrumChart {
   }
 
   chart(name, side, plot, said) {
-    const range = new Range(side.least);
+    const unit = new ClimbingUnit(side.unit, side.prefix);
+    const range = new Range(side.least * unit.factor);
     const size = () => ({ width: Math.max(120, plot.clientWidth), height: Math.max(80, plot.clientHeight) });
     const u = new uPlot(
       {
@@ -38,36 +40,41 @@ export class SpectrumChart {
         cursor: { y: false, points: { show: false }, drag: { x: false, y: false } },
         scales: {
           x: { time: false, auto: false, distr: 3, log: 10, range: (_, min, max) => [min, max] },
-          y: { auto: false, range: () => range.now },
+          y: { auto: false, range: (_, min, max) => [min, max] },
         },
         series: [{}, { stroke: () => colour(side.colour), width: 1.4, auto: false, points: { show: false } }],
         axes: [
           { ...bottomAxis("frequency (Hz)"), values: (_, splits) => splits.map((hz) => (hz == null ? null : axisNumbers([hz], hz < 1 ? 0.1 : 1)[0])) },
-          leftAxis(side.axis),
+          leftAxis(named(side.axis, unit.name)),
         ],
       },
       [[1, 2], [0, 0]],
       plot,
     );
     new ResizeObserver(() => plot.clientWidth && u.setSize(size())).observe(plot);
-    return { name, side, u, range, said };
+    return { name, side, unit, u, range, said };
   }
 
   show({ tables: { spectrum }, lines }) {
-    for (const { name, side, u, range } of this.charts) {
+    for (const chart of this.charts) {
+      const { name, side, unit, u } = chart;
       const column = spectrum?.columns.find((one) => one.name === name);
       const at = spectrum ? times(spectrum) : new Float64Array(0);
-      const heights = column ? scaled(column.values, side.factor) : new Float64Array(0);
-      range.follow(...extent([heights], [0]));
+      if (unit.serve(Math.max(side.least, extent([column?.values ?? []])[1]))) {
+        chart.range = new Range(side.least * unit.factor);
+        u.axes[1].label = named(side.axis, unit.name);
+      }
+      const heights = column ? scaled(column.values, unit.factor) : new Float64Array(0);
+      chart.range.follow(...extent([heights], [0]));
       u.setData([at, heights], false);
-      u.setScale("y", { min: range.now[0], max: range.now[1] });
+      u.setScale("y", { min: 0, max: chart.range.now[1] });
       if (at.length) u.setScale("x", { min: at[0], max: at.at(-1) });
     }
     this.tell(lines);
   }
 
   words(lines) {
-    for (const { name, side, said } of this.charts) put(said, `${side.label}: ${named(lines?.[name], side.unit)}`);
+    for (const { name, side, said } of this.charts) put(said, `${side.label}: ${told(lines?.[name], side.unit)}`);
     put(this.note, lines?.to_s ? `Amplitudes, ${lines.from_s.toFixed(2)} to ${lines.to_s.toFixed(2)} s.` : "Too few samples for a spectrum.");
   }
 
@@ -77,7 +84,7 @@ export class SpectrumChart {
 }
 
 /** The main line in words. */
-function named(line, unit) {
+function told(line, unit) {
   if (!line) return `no line stands out`;
   return `${amount(line.frequency_Hz, "Hz")}, ${amount(line.width, unit)} peak to peak`;
 }

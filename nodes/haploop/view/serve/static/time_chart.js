@@ -1,6 +1,6 @@
 // A chart over simulated time: lines of one unit, the events that changed the run, a cursor shared with its neighbours.
 
-import { amount, steady } from "./amounts.js";
+import { amount, named, steady } from "./amounts.js";
 import { bareAxis, bottomAxis, leftAxis } from "./axes.js";
 import { make, onSight, seldom } from "./dom.js";
 import { Legend, stroke } from "./legend.js";
@@ -215,6 +215,3 @@ export class TimeChart {
     if (size.width !== this.u.width || size.height !== this.u.height) this.u.setSize(size);
   }
 }
-
-/** What stands along an axis: a quantity with its unit, or the one that there is. */
-const named = (label, unit) => (label && unit ? `${label} (${unit})` : label || unit || "pure number");
