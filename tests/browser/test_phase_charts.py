@@ -11,13 +11,29 @@ from oracles.snapshots import contact, snapshot, table
 
 @pytest.mark.slow
 def test_without_wall_or_inertia_the_loops_say_that_there_is_none(stand_in, page):
-    stand_in.show(snapshot(0.0, 2.0, table("position", 0.0, 5e-3, ("x", "m", "position", [0.001] * 400))))
+    still_there = table("position", 0.0, 5e-3, ("x", "m", "position", [0.001] * 400))
+    stand_in.state(wall=None, elements=[])
+    stand_in.show(snapshot(0.0, 2.0, still_there))
     expect(page.locator("#loop .absent")).to_contain_text("No wall")
     expect(page.locator("#momentum .absent")).to_contain_text("No virtual inertia")
     stand_in.show(contact())
     expect(page.locator("#loop .absent")).to_be_empty()
     expect(page.locator("#loop .legend")).to_contain_text("ideal spring")
     expect(page.locator("#momentum .legend")).to_contain_text("unidirectional-inertia")
+
+
+def test_where_only_extremes_are_kept_no_wall_is_denied_and_no_line_swings_between_them(stand_in, page):
+    """Intervals of 0.1 s between the same two extremes: a line through them would go up and down as nothing did."""
+    rows = [(0.0, 0.01)[i % 2] for i in range(40)]
+    stand_in.show(snapshot(0.0, 2.0, table("position", 0.025, 0.05, ("x", "m", "position", rows), envelope=True), coarse=True))
+    expect(page.locator("#position .note")).to_have_text("only ranges of 100 ms kept")
+    expect(page.locator("#loop .absent")).to_contain_text("least and greatest of each interval")
+    expect(page.locator("#momentum .absent")).to_contain_text("least and greatest of each interval")
+    middle = seen(page, "position", [0.0125 + 0.05 * i for i in range(1, 19)], "ink")
+    assert all(edges and edges[1] - edges[0] > 0.8 for edges in middle), "from the least to the greatest all along"
+    page.click("[data-panel=spectrum]")
+    expect(page.locator("#spectrum > .about")).to_contain_text("No spectrum")
+    expect(page.locator("#spectrum")).not_to_contain_text("no line stands out")
 
 
 @pytest.mark.slow

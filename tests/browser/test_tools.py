@@ -53,6 +53,35 @@ def test_two_clicks_measure_time_frequency_and_differences_and_a_third_ends_it(s
     expect(page.locator("#position .note")).not_to_contain_text("Δ")
 
 
+def test_what_was_measured_stays_when_its_marks_are_moved_out_of_sight(stand_in, page):
+    ramp = [0.01 * i / 400 for i in range(401)]
+    stand_in.show(snapshot(0.0, 2.0, table("position", 0.0, 0.005, ("x", "m", "position", ramp))))
+    expect(page.locator("#position .legend")).to_contain_text("10.000")
+    box = page.locator("#position .u-over").bounding_box()
+    for part in (0.25, 0.75):
+        page.mouse.click(box["x"] + box["width"] * part, box["y"] + 20)
+    expect(page.locator("#position .legend")).to_contain_text(re.compile(r"Δ (4\.9|5\.0)"))
+    page.wait_for_timeout(300)  # texts come some times a second
+    told = page.inner_text("#position .head")
+    stand_in.show(snapshot(3.0, 5.0, table("position", 3.0, 0.005, ("x", "m", "position", ramp))))
+    stand_in.drawn()
+    page.wait_for_timeout(200)
+    assert page.inner_text("#position .head") == told
+
+
+def test_where_a_pixel_covers_many_samples_a_range_is_read_and_at_last_one_sample_of_all(stand_in, page):
+    ends = [(-0.0625, -0.0575)[i % 2] for i in range(2000)]
+    many = table("position", 0.0, 0.001, ("x", "m", "position", ends), ("wall", "m", "wall", [-0.06] * 2000), envelope=True)
+    stand_in.show(snapshot(0.0, 2.0, {**many, "last": [-0.0612, -0.06]}))
+    expect(page.locator("#position .legend output")).to_have_text(["−61.200", "−60.000"])
+    box = page.locator("#position .u-over").bounding_box()
+    page.mouse.move(box["x"] + box["width"] * 0.5, box["y"] + 20)
+    expect(page.locator("#position .legend output")).to_have_text(["−62.5…−57.5", "−60.000"])
+    for part in (0.25, 0.75):
+        page.mouse.click(box["x"] + box["width"] * part, box["y"] + 20)
+    expect(page.locator("#position .legend output")).to_have_text(["Δ −5.0…5.0", "Δ 0.000"])
+
+
 def test_picture_and_numbers_are_saved_as_files(stand_in, page, tmp_path):
     stand_in.show(contact())
     expect(page.locator("#force .legend")).to_contain_text("total")
@@ -92,6 +121,10 @@ def test_dragging_the_strip_shows_another_part_of_the_run_and_its_end_is_live(st
     stand_in.state(tick=10_000, end_tick=20_000)
     stand_in.show(contact(8.0, 10.0))
     expect(page.locator("#scrub-ends")).to_have_text("0.0–10.0 s")
+    box = page.locator("#scrub").bounding_box()
+    page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    stand_in.asked(lambda watch: watch["end_s"] is not None)
+    assert 480 <= int(page.input_value("#scrub")) <= 520, "the handle stays where it was put"
     page.fill("#scrub", "500")
     asked = stand_in.asked(lambda watch: watch["end_s"] is not None)
     assert (asked["span_s"], asked["end_s"]) == (pytest.approx(2.0), pytest.approx(5.0, abs=0.02))

@@ -16,7 +16,7 @@ def table(name: str, t0_s: float, dt_s: float, *columns: Column, envelope: bool 
     return {"name": name, "t0_s": t0_s, "dt_s": dt_s, "columns": columns, "envelope": envelope}
 
 
-def snapshot(from_s: float, to_s: float, *tables: dict[str, Any]) -> bytes:
+def snapshot(from_s: float, to_s: float, *tables: dict[str, Any], **more: Any) -> bytes:
     """Length and header, then the columns of every table as little-endian 32-bit floats, each table filled up to 8."""
     rows = [len(t["columns"][0][3]) for t in tables]
     described = [
@@ -27,7 +27,7 @@ def snapshot(from_s: float, to_s: float, *tables: dict[str, Any]) -> bytes:
         }
         for t, count in zip(tables, rows, strict=True)
     ]
-    header = json.dumps({"from_s": from_s, "to_s": to_s, "tables": described}).encode()
+    header = json.dumps({"from_s": from_s, "to_s": to_s, "tables": described, **more}).encode()
     header += b" " * (-(4 + len(header)) % 8)
     body = b""
     for t, count in zip(tables, rows, strict=True):

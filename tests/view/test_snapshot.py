@@ -146,6 +146,8 @@ def test_a_book_that_is_closed_is_shown_only_while_its_energy_changes():
     assert shown == ["wall", "damping-2", "residual"]
     shown = [column["name"] for column in drawn(history, span_s=1.0)["tables"]["energy"]["columns"]]
     assert shown == ["wall", "damping", "damping-2", "residual"]
+    labels = [column["label"] for column in drawn(history, span_s=1.0)["tables"]["energy"]["columns"]]
+    assert labels == ["wall", "damping, closed", "element 0: damping", "residual"], "as the chart of forces has it"
 
 
 def test_numbers_beyond_what_a_float32_holds_do_not_break_the_snapshot():
@@ -248,3 +250,17 @@ def test_own_columns_of_elements_are_shown_in_their_units_while_their_elements_a
     assert np.isnan(seen[200:]).all()
     late = drawn(history, span_s=0.05, panel="own")["tables"]
     assert not [name for name in late if name.startswith("own")]
+
+
+def test_an_envelope_has_the_newest_values_of_one_tick_beside_it_and_says_where_the_past_is_kept_coarsely():
+    history = made_up(ticks=400, elements=[element("damping", damping=1.0)])
+    shown = drawn(history, span_s=None, points=50)
+    assert not shown["coarse"]
+    force = shown["tables"]["force"]
+    last = dict(zip([column["name"] for column in force["columns"]], force["last"], strict=True))
+    assert (last["wall"], last["element.0.damping"], last["total"]) == (399.0, 798.0, 399.0)
+    x, _, measured = shown["tables"]["position"]["last"]
+    assert (x, measured) == (3990.0, 399.0), "position and measured position of the same instant"
+    long = made_up(ticks=40_000)
+    assert drawn(long, span_s=0.2, end_s=1.0)["coarse"]
+    assert not drawn(long, span_s=0.2)["coarse"]

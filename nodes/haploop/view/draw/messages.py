@@ -49,6 +49,7 @@ class Table:
         t0_s, dt_s: row i is at ``t0_s + i dt_s``, s.
         values: shape (columns, rows).
         envelope: whether each two rows are the extremes of one interval of time, instead of samples.
+        last: the newest values of the columns, all of one tick; empty where they are not known.
         more: further numbers of the header.
     """
 
@@ -58,6 +59,7 @@ class Table:
     columns: Sequence[Column]
     values: np.ndarray
     envelope: bool = False
+    last: Sequence[float] = ()
     more: dict[str, Any] = dataclasses.field(default_factory=dict)
 
 
@@ -76,6 +78,7 @@ def encode(from_s: float, to_s: float, tables: Sequence[Table], **more: Any) -> 
             "rows": table.values.shape[1],
             "columns": [column._asdict() for column in table.columns],
             "envelope": table.envelope,
+            "last": finite(list(table.last)),
             **finite(table.more),
         }
         for table in tables
@@ -110,6 +113,7 @@ def state(session: RunSession) -> Message:
         "plant_rate": time.plant_rate,
         "pace": status.get("pace"),
         "real_time_factor": session.real_time_factor,
+        "was_paused": any("pause" in event for _, event in session.events),
         "lateness": (summary or status).get("lateness") or None,
         "nodes": [] if session.outcome else status.get("nodes", []),
         "skipped_ticks": session.skipped_ticks,

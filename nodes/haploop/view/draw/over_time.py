@@ -16,8 +16,8 @@ from haploop.view.store.lod_series import LodSeries
 _ROWS_A_POINT, _BUCKETS_A_POINT = 2.0, 1.0
 # Parts of an overview of the run; units of own columns that are shown, the first.
 _OVERVIEW_PARTS, _MOST_UNITS = 256, 3
-_BODIES = {"x": "position", "tip_x": "position of the tip", "hand_x": "position of the hand"}
-_MEASURED = {"wall_position": Column("wall", "m", "wall"), "x_measured": Column("x_measured", "m", "measured position")}
+_BODIES = {"x": "position", "tip_x": "tip", "hand_x": "hand"}
+_MEASURED = {"wall_position": Column("wall", "m", "wall"), "x_measured": Column("x_measured", "m", "measured")}
 _MAKING = re.compile(r"-\d+$")
 # Columns of one series by name, each with its header entry.
 Part = tuple[LodSeries, Mapping[str, Column]]
@@ -57,8 +57,13 @@ class Interval:
         shown = [i for i, known in enumerate(columns) if is_shown(known, rows[i])]
         if not shown:
             return None
-        columns = [columns[i] for i in shown]
-        return Table(name, first / self._rate, step / self._rate, columns, rows[shown], envelope=not in_full)
+        columns, last = [columns[i] for i in shown], self._last(parts)[shown].tolist()
+        return Table(name, first / self._rate, step / self._rate, columns, rows[shown], not in_full, last)
+
+    def _last(self, parts: list[Part]) -> np.ndarray:
+        """Returns the columns at the beginning of the newest tick that all series know; NaN where it is not in full."""
+        tick = min([self._end, *(series.end_tick for series, _ in parts)]) - 1
+        return np.concatenate([series.rows(list(columns), tick, tick + 1)[:, 0] for series, columns in parts])
 
     def _bucket(self, all_series: list[LodSeries]) -> int:
         """Returns the ticks of a bucket: the least power of two that leaves no more buckets than there is room for."""
@@ -95,9 +100,10 @@ def _energy(history: History) -> tuple[str, list[Part], IsShown]:
     """Lists the books of the wall, of the elements at work, and of those whose energy changes in the interval."""
     columns = {WALL_BOOK: Column("wall", "J", "wall")} if history.at_work.wall else {}
     books = [name.removesuffix(TRUE) for name in history.energy.names if name.endswith(TRUE) and name != WALL_BOOK]
-    columns |= {f"{name}{TRUE}": Column(name, "J", name) for name in books}
+    at_work = _books_at_work(history, books)
+    columns |= {f"{name}{TRUE}": Column(name, "J", at_work.get(name, f"{name}, closed")) for name in books}
     columns["residual"] = Column("residual", "J", "residual")
-    always = {"wall", "residual", *_books_at_work(history, books)}
+    always = {"wall", "residual", *at_work}
 
     def is_shown(known: Column, values: np.ndarray) -> bool:
         finite = values[np.isfinite(values)]
@@ -106,11 +112,17 @@ def _energy(history: History) -> tuple[str, list[Part], IsShown]:
     return "energy", [(history.energy, columns)], is_shown
 
 
-def _books_at_work(history: History, books: list[str]) -> list[str]:
-    """Returns the newest books of each kind, as many as elements of the kind are at work; the others are closed."""
-    found: list[str] = []
-    for element in history.at_work.elements:
-        found += [name for name in books if name not in found and _MAKING.sub("", name) == element.name][-1:]
+def _books_at_work(history: History, books: list[str]) -> dict[str, str]:
+    """Returns the newest books of each kind, as many as elements of the kind are at work, with these by place and kind.
+
+    The others are closed.
+    """
+    elements = list(enumerate(history.at_work.elements))
+    found: dict[str, str] = {}
+    for kind in dict.fromkeys(element.name for _, element in elements):
+        labels = [f"element {place}: {kind}" for place, element in elements if element.name == kind]
+        own = [name for name in books if _MAKING.sub("", name) == kind][-len(labels) :]
+        found |= dict(zip(own, labels, strict=False))
     return found
 
 

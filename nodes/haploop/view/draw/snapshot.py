@@ -44,7 +44,8 @@ def snapshot(
     Tables over time are position, force and energy; each row by row where the page has room for it, else as an envelope
     whose rows are the two extremes of consecutive buckets, rising or falling as they do. Position and total force of
     ``overlay``, another run, come with them. Where ``beside`` is asked for, there is an overview of the whole run, too,
-    and what the page's panel asks for, to which ``changes`` belong. A table without data is left out.
+    and what the page's panel asks for, to which ``changes`` belong. A table without data is left out. ``coarse``
+    in the header tells that the interval begins before what is held in full.
     """
     rate = history.time.control_rate
     from_tick, to_tick = _window(history, viewport)
@@ -54,11 +55,13 @@ def snapshot(
     more: dict[str, Any] = {}
     if first < end:
         interval = Interval(first, end, rate, viewport.points)
+        more["coarse"] = first < max(history.steps.full_from_tick, history.ticks.full_from_tick)
         tables = over_time(history, interval)
         tables += laid_over(overlay, from_tick / rate, to_tick / rate, viewport.points) if overlay else []
         tables += [sound(history)] if viewport.sound else []
         if beside:
-            of_panel, more = PANELS[viewport.panel](Look(history, first, end, interval, changes))
+            of_panel, own = PANELS[viewport.panel](Look(history, first, end, interval, changes))
+            more |= own
             tables += [overview(history), *of_panel]
     return encode(from_tick / rate, to_tick / rate, [table for table in tables if table], beside=beside, **more)
 

@@ -28,6 +28,15 @@ export function amount(value, unit, digits = 3) {
   return `${fixed(value / factor, digits)} ${letter}${unit}`;
 }
 
+/** From one number to another, both in the unit of the larger: "−3.19 to −1.00 mm". */
+export function amounts(low, high, unit) {
+  if (!isNumber(low) || !isNumber(high)) return NONE;
+  const largest = Math.max(Math.abs(low), Math.abs(high));
+  const [factor, letter] = prefixOf(largest);
+  const decimals = (fixed(largest / factor).split(".")[1] ?? "").length;
+  return `${[low, high].map((value) => steady(value / factor, decimals)).join(" to ")} ${letter}${unit}`;
+}
+
 /** What is there of a whole, both in the whole's unit and to its digits: "0.52 of 1.00 MN/m". */
 export function amountOf(part, whole, unit) {
   const [factor, letter] = prefixOf(whole);

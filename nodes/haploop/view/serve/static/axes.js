@@ -25,7 +25,7 @@ const common = () => ({
 const numbers = (u, splits, axis, space, step) => axisNumbers(splits, step);
 
 /** The axis to the left. */
-export const leftAxis = (label) => ({ ...common(), scale: "y", label, size: LEFT_PX, space: 24, values: numbers });
+export const leftAxis = (label) => ({ ...common(), scale: "y", label, size: LEFT_PX, space: 18, values: numbers });
 
 /** The axis below; `space` px at least lie between its numbers, and more where they are long. */
 export const bottomAxis = (label, space = 56) => ({

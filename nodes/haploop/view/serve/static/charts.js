@@ -31,19 +31,20 @@ export class Charts {
    * @param {object} snapshot as decoded.
    * @param {object} state the run's state.
    * @param {object[]} marks what changed the run.
-   * @param {boolean} fits whether the axes have room for the run that is drawn behind, too.
+   * @param {{label: string, fits: boolean}} behind the run that is drawn over it: its name, and whether the axes have room for it.
    */
-  show(snapshot, state, marks, fits = true) {
+  show(snapshot, state, marks, behind) {
     const { from_s, to_s, tables } = snapshot;
     this.viewport.shown = [from_s, to_s];
     for (const [name, chart] of Object.entries(this.charts)) {
       const lines = tables[name] ? linesOf(tables[name]) : [];
+      const table = tables[`overlay_${name}`];
       chart.show([from_s, to_s], tables[name] ? times(tables[name]) : NO_TIMES, lines, {
+        isEnvelope: tables[name]?.envelope,
         wall: name === "position" ? wallOf(lines, state) : null,
         marks,
         note: name === "energy" ? residual(state) : "",
-        overlay: tables[`overlay_${name}`] ?? null,
-        fits,
+        overlay: table ? { table, ...behind } : null,
       });
     }
     this.panels.show(snapshot, state, marks);

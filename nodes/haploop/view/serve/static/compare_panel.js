@@ -1,6 +1,6 @@
 // Before and after the last change side by side: position and force over half a second each, and what is seen of them.
 
-import { amount, NONE } from "./amounts.js";
+import { amount, amounts, NONE } from "./amounts.js";
 import { make, put } from "./dom.js";
 import { colour } from "./palette.js";
 
@@ -44,7 +44,7 @@ export class ComparePanel {
     const all = traces.filter(Boolean).flatMap((values) => [...values]);
     const [low, high] = [Math.min(...all), Math.max(...all)];
     const most = Math.max(...traces.map((values) => values?.length ?? 0));
-    put(picture.firstChild, `${picture.firstChild.textContent.split(",")[0]}, ${amount(low, unit)} to ${amount(high, unit)}`);
+    put(picture.firstChild, `${picture.firstChild.textContent.split(",")[0]}, ${amounts(low, high, unit)}`);
     picture.querySelectorAll("canvas").forEach((canvas, side) => {
       const ratio = devicePixelRatio;
       const width = Math.round(canvas.clientWidth * ratio);

@@ -85,10 +85,11 @@ function share({ residual_J: residual, moved_J: moved }) {
   return isNumber(residual) && moved > 0 ? power(Math.abs(residual) / moved) : NONE;
 }
 
-function factor({ real_time_factor: now, pace, summary, lateness: late }) {
+function factor({ real_time_factor: now, pace, summary, was_paused: paused, lateness: late }) {
   if (late?.clock === "plant" && late.ticks) return `${fixed((100 * late.late_ticks) / late.ticks, 2)} % late`;
   const real = summary?.real_time_factor ?? now;
   if (!isNumber(real)) return NONE;
+  if (summary && paused) return `${fixed(real)}×, paused`; // the pauses are in it
   return isNumber(pace) && pace !== 1 && !summary ? `${Math.round((100 * real) / pace)} % of ${plain(pace)}×` : `${fixed(real)}×`;
 }
 

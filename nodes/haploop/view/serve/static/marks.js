@@ -21,7 +21,7 @@ export function marksOf(events) {
   return [...marks.values()].sort((a, b) => a.tick - b.tick);
 }
 
-/** Draw the marks that lie in the chart, labels over all lines; a label that has no room is left out, its line never is. */
+/** Draw the marks that lie in the chart, labels over the lines of marks; a label that has no room is left out, its line never is. */
 export function drawMarks(u, marks) {
   const { left, top, width, height } = u.bbox;
   const { min, max } = u.scales.x;

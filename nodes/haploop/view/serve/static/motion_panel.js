@@ -5,7 +5,7 @@ import { FONT } from "./axes.js";
 import { fitCanvas, make, put, seldom } from "./dom.js";
 import { colour } from "./palette.js";
 import { extent, Range } from "./range.js";
-import { last } from "./snapshot.js";
+import { newest } from "./snapshot.js";
 
 const HEIGHT = 170;
 const LANE = 0.45;
@@ -33,7 +33,7 @@ export class MotionPanel {
     if (!position) return this.tell("Nothing moves yet.");
     const bodies = Object.keys(BODIES).flatMap((name) => {
       const column = position.columns.find((one) => one.name === name);
-      return column ? [{ name, values: column.values, at: last(column.values) }] : [];
+      return column ? [{ name, values: column.values, at: newest(column) }] : [];
     });
     const face = wall?.into_wall ? wall.position : NaN;
     this.range.follow(...extent(bodies.map(({ values }) => values), Number.isFinite(face) ? [face] : []));
@@ -45,7 +45,7 @@ export class MotionPanel {
     const total = force?.columns.find(({ name }) => name === "total");
     const depth = (bodies[0].at - face) * (wall?.into_wall ?? 0);
     const where = depth > 0 ? `${amount(depth, "m")} inside the wall` : "outside the wall";
-    return this.tell(`${Number.isFinite(face) ? where : "no wall"}; ${amount(high - low, "m")} across${total ? `; force ${amount(last(total.values), "N")}` : ""}`);
+    return this.tell(`${Number.isFinite(face) ? where : "no wall"}; ${amount(high - low, "m")} across${total ? `; force ${amount(newest(total), "N")}` : ""}`);
   }
 
   wall(ctx, x, side, width) {

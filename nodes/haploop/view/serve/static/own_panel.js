@@ -22,7 +22,7 @@ export class OwnPanel {
     if (units !== this.units) this.build(own, units);
     put(this.note, own.length ? "" : NOTHING);
     own.forEach((table, i) => {
-      this.charts[i].show([from, to], times(table), linesOf(table), { marks });
+      this.charts[i].show([from, to], times(table), linesOf(table), { isEnvelope: table.envelope, marks });
     });
   }
 

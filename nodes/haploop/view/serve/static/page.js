@@ -128,7 +128,7 @@ function draw() {
 
 function redraw() {
   if (!snapshot) return;
-  charts.show(snapshot, state, marks, !runs.listing?.overlay_diverged);
+  charts.show(snapshot, state, marks, runs.behind());
   scrubber.show(snapshot, marks);
   sound.play(snapshot, state);
 }

@@ -40,7 +40,7 @@ export function linesFor(columns) {
 export function linesOf({ columns }) {
   const drawn = columns.filter(({ name }) => name !== "residual");
   const looks = linesFor(drawn);
-  return drawn.map(({ name, label, values }, i) => ({ key: name, label, line: looks[i], values }));
+  return drawn.map(({ name, label, values, last }, i) => ({ key: name, label, line: looks[i], values, last }));
 }
 
 /** "element 0: damping", its own column "element 0: damping, alpha" and the book "damping-2" are of the kind "damping". */

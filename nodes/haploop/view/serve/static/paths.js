@@ -129,6 +129,19 @@ function pixelOf(name, alpha) {
   return ((Math.round(255 * alpha) << 24) | (blue << 16) | (green << 8) | red) >>> 0;
 }
 
+/** Each two points, the extremes of an interval, as a box around what lies between them. */
+export function boxes(u, xs, ys) {
+  const { x0, kx, left, y1, ky, top } = projection(u);
+  const path = new Path2D();
+  for (let i = 0; i + 1 < xs.length; i += 2) {
+    const half = (xs[i + 1] - xs[i]) / 2;
+    const [from, to] = [xs[i] - half, xs[i + 1] + half].map((x) => left + (x - x0) * kx);
+    const [one, other] = [ys[i], ys[i + 1]].map((y) => top + (y1 - y) * ky);
+    if (one - one + other - other === 0) path.rect(from, Math.min(one, other), to - from, Math.abs(other - one));
+  }
+  return path;
+}
+
 /** Small squares at all points. */
 export function dots(u, xs, ys, size) {
   const { x0, kx, left, y1, ky, top } = projection(u);

@@ -14,6 +14,7 @@ export class PhaseChart {
    * @param {object} options x and y: names of the axes with units; least: [x, y] the axes never cover less.
    */
   constructor(host, { x, y, least }) {
+    this.host = host;
     this.labels = [x, y];
     this.ranges = least.map((smallest) => new Range(smallest));
     this.legend = new Legend(host, () => this.build());
@@ -77,6 +78,7 @@ export class PhaseChart {
     this.parts = parts;
     put(this.absent, absent);
     this.plot.hidden = absent !== "";
+    this.host.classList.toggle("bare", this.plot.hidden); // a sentence leaves its room to the other loop
     const [x, y] = ["x", "y"].map((side) => extent(parts.map((part) => part[side]), parts.length ? [0] : []));
     this.ranges[0].follow(...x);
     this.ranges[1].follow(...y);

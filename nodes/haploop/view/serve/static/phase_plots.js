@@ -9,6 +9,8 @@ const MM = 1e3;
 const GRAMS = 1e3;
 const DOT_PX = 3;
 const NOW_PX = 7;
+const COARSE = "Of this time only the least and greatest of each interval are kept here, so no loop of it; the log has every sample.";
+const NONE_HERE = "No loop in this time.";
 const NO_WALL = "No wall, so no loop of force and penetration.";
 const NO_INERTIA = "No virtual inertia at work, so no loop of momentum and velocity.";
 const LINES = {
@@ -29,9 +31,11 @@ export class PhasePlots {
   }
 
   /** Show the loops among the tables of a snapshot, or say why there is none. */
-  show({ tables: { loop, momentum } }) {
-    this.loop.show(loop ? forceLoop(loop) : [], loop ? "" : NO_WALL);
-    this.momentum.show(momentum ? momentumLoops(momentum) : [], momentum ? "" : NO_INERTIA);
+  show({ tables: { loop, momentum }, coarse }, { wall, elements = [] }) {
+    const why = coarse ? COARSE : NONE_HERE;
+    const hasInertia = elements.some(({ kind }) => kind.includes("inertia"));
+    this.loop.show(loop ? forceLoop(loop) : [], loop ? "" : wall?.into_wall ? why : NO_WALL);
+    this.momentum.show(momentum ? momentumLoops(momentum) : [], momentum ? "" : hasInertia ? why : NO_INERTIA);
   }
 
   drawAll() {

@@ -31,6 +31,12 @@ export class RunChoice {
     this.mark();
   }
 
+  /** The run that is drawn over the one on show: its name, and whether its numbers leave room for others. */
+  behind() {
+    const { overlay, past = [], overlay_diverged: diverged } = this.listing ?? {};
+    return { label: `over: ${past.find(({ id }) => id === overlay)?.title ?? overlay}`, fits: !diverged };
+  }
+
   mark() {
     const { shown, overlay } = this.listing;
     if (document.activeElement !== byId("run")) byId("run").value = shown ?? "";

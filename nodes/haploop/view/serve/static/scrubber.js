@@ -14,6 +14,9 @@ export class Scrubber {
     this.canvas = byId("overview");
     this.input = byId("scrub");
     Object.assign(this.input, { min: "0", max: String(STEPS), step: "1" });
+    this.isHeld = false;
+    this.input.addEventListener("pointerdown", () => (this.isHeld = true));
+    for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => (this.isHeld = false));
     this.input.addEventListener("input", () => this.move(Number(this.input.value) / STEPS));
     this.show = seldom((...what) => this.draw(...what));
     fitCanvas(this.canvas, HEIGHT, () => this.last && this.draw(...this.last));
@@ -35,7 +38,7 @@ export class Scrubber {
     const { width, height } = this.canvas;
     const ctx = this.canvas.getContext("2d");
     ctx.clearRect(0, 0, width, height);
-    const { first_s: first, last_s: last } = this.viewport;
+    const { first_s: first, last_s: last, end_s: end } = this.viewport;
     if (!(last > first)) return;
     const across = (t) => ((t - first) / (last - first)) * width;
     ctx.fillStyle = colour("grid");
@@ -43,7 +46,8 @@ export class Scrubber {
     if (overview) this.band(ctx, overview, across, height);
     ctx.fillStyle = colour("mark");
     for (const { t_s, changes } of marks) if (changes) ctx.fillRect(Math.round(across(t_s)), 0, ratio, height);
-    if (document.activeElement !== this.input) this.input.value = String(Math.round((STEPS * (Math.min(to, last) - first)) / (last - first)));
+    // As it was asked for: what is drawn comes a little later.
+    if (!this.isHeld) this.input.value = String(Math.round((STEPS * ((end ?? last) - first)) / (last - first)));
     this.input.setAttribute("aria-valuetext", `${from.toFixed(2)} to ${Math.min(to, last).toFixed(2)} s`);
     put(byId("scrub-ends"), `${first.toFixed(1)}–${last.toFixed(1)} s`);
   }

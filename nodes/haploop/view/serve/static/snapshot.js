@@ -6,7 +6,8 @@ const utf8 = new TextDecoder();
  * Decode a snapshot.
  *
  * @param {ArrayBuffer} buffer uint32 length of the header (little-endian), the header as JSON, then the tables.
- * @returns {object} from_s, to_s and tables: name -> {t0_s, dt_s, rows, envelope, columns: [{name, unit, label, values}]}
+ * @returns {object} from_s, to_s and tables: name -> {t0_s, dt_s, rows, envelope, columns: [{name, unit, label, values,
+ *   last}]}; last: the newest value, where it is known apart from the values
  */
 export function decode(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
@@ -16,6 +17,7 @@ export function decode(buffer) {
   for (const table of header.tables) {
     const columns = table.columns.map((column, i) => ({
       ...column,
+      ...(table.last?.length ? { last: table.last[i] } : {}),
       values: new Float32Array(buffer, at + 4 * table.rows * i, table.rows),
     }));
     tables[table.name] = { ...table, columns };
@@ -39,8 +41,9 @@ export function scaled(values, factor) {
   return other;
 }
 
-/** The last number of a column that is there; NaN for none. */
-export function last(values) {
+/** The newest number of a column that is there; NaN for none. */
+export function newest({ values, last }) {
+  if (last !== undefined) return last ?? NaN;
   let i = values.length - 1;
   while (i > 0 && Number.isNaN(values[i])) i--;
   return values[i] ?? NaN;

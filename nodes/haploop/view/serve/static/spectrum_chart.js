@@ -25,7 +25,7 @@ export class SpectrumChart {
       return this.chart(name, side, plot, said);
     });
     host.append(this.note);
-    this.tell = seldom((lines) => this.words(lines));
+    this.tell = seldom((...what) => this.words(...what));
   }
 
   chart(name, side, plot, said) {
@@ -55,7 +55,7 @@ export class SpectrumChart {
     return { name, side, unit, u, range, said };
   }
 
-  show({ tables: { spectrum }, lines }) {
+  show({ tables: { spectrum }, lines, coarse }) {
     for (const chart of this.charts) {
       const { name, side, unit, u } = chart;
       const column = spectrum?.columns.find((one) => one.name === name);
@@ -70,12 +70,13 @@ export class SpectrumChart {
       u.setScale("y", { min: 0, max: chart.range.now[1] });
       if (at.length) u.setScale("x", { min: at[0], max: at.at(-1) });
     }
-    this.tell(lines);
+    this.tell(spectrum ? lines : null, coarse);
   }
 
-  words(lines) {
-    for (const { name, side, said } of this.charts) put(said, `${side.label}: ${told(lines?.[name], side.unit)}`);
-    put(this.note, lines?.to_s ? `Amplitudes, ${lines.from_s.toFixed(2)} to ${lines.to_s.toFixed(2)} s.` : "Too few samples for a spectrum.");
+  words(lines, coarse) {
+    for (const { name, side, said } of this.charts) put(said, lines ? `${side.label}: ${told(lines[name], side.unit)}` : side.label);
+    const missing = coarse ? "No spectrum: of this time only the least and greatest of each interval are kept here." : "Too few samples for a spectrum.";
+    put(this.note, lines ? `Amplitudes, ${lines.from_s.toFixed(2)} to ${lines.to_s.toFixed(2)} s.` : missing);
   }
 
   refit() {

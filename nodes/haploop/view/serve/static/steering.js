@@ -42,5 +42,6 @@ export function say({ ok, text }) {
   const said = byId("said");
   said.dataset.ok = String(ok);
   said.setAttribute("role", ok ? "status" : "alert");
-  put(said, ok ? text : `Refused: ${text}`);
+  // There is a button for what a terminal is told to do to go back.
+  put(said, ok ? text.replace(/; to go back: .*$/, "") : `Refused: ${text}`);
 }

@@ -1,6 +1,6 @@
 // What came of a run that has ended: the figures and books of its summary.json.
 
-import { amount, fixed, isNumber, NONE, programName } from "./amounts.js";
+import { amount, amounts, fixed, isNumber, NONE, programName } from "./amounts.js";
 import { byId, make } from "./dom.js";
 import { isJudged, told } from "./header.js";
 
@@ -19,7 +19,7 @@ export function showSummary(state) {
     make("h2", { id: "summary-title" }, `${summary.ended === "failed" ? "Failed" : "Ended"}: ${told(state) ?? NONE}`),
     make("p", { class: "about" }, (isJudged(state) ? summary.verdict_rule : state.sight?.why) ?? ""),
     make("p", { class: "balance" }, summary.energy?.balance ?? ""),
-    rows({ ...pushed(summary.stability ?? {}), ...figures(summary), ...foreign(summary.programs) }),
+    rows({ ...pushed(summary.stability ?? {}), ...figures(summary, state.was_paused), ...foreign(summary.programs) }),
     books(summary.energy ?? {}),
     make("p", { class: "about" }, "In ", make("code", {}, out)),
   );
@@ -44,14 +44,14 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
 
 const share = (own) => (own < 0.01 ? "less than 1 %" : `${Math.round(100 * own)} %`);
 
-function figures({ duration_s, ended, extremes = {}, window = {}, real_time_factor: factor, lost = {} }) {
+function figures({ duration_s, ended, extremes = {}, window = {}, real_time_factor: factor, lost = {} }, wasPaused) {
   return {
     ran: `${isNumber(duration_s) ? fixed(duration_s, 4) : NONE} s, ${HOW[ended] ?? ended}`,
-    "position from": `${amount(extremes.x_min_m, "m")} to ${amount(extremes.x_max_m, "m")}`,
+    "position from": amounts(extremes.x_min_m, extremes.x_max_m, "m"),
     // That of the run itself: noise and the hand, which the pushed copies have not, are in it.
     ...(isNumber(window.force_ripple_N) ? { "its own force ripples": `${amount(window.force_ripple_N, "N")} above 30 Hz` } : {}),
     "largest force": amount(extremes.force_max_N, "N"),
-    "real time": isNumber(factor) ? `${fixed(factor)}×` : NONE,
+    "real time": isNumber(factor) ? `${fixed(factor)}×${wasPaused ? ", its pauses in it" : ""}` : NONE,
     "commands lost, dropped": `${lost.commands_lost ?? 0}, ${lost.commands_dropped ?? 0}`,
   };
 }

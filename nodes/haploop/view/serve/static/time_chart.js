@@ -7,15 +7,19 @@ import { Legend, stroke } from "./legend.js";
 import { drawMarks, drawMeasured } from "./marks.js";
 import { ClimbingUnit } from "./climbing.js";
 import { colour } from "./palette.js";
-import { drawStrips, halfPlane, line as linePath, strips } from "./paths.js";
-import { last, scaled, times } from "./snapshot.js";
+import { boxes, drawStrips, halfPlane, line as linePath, strips } from "./paths.js";
 import { extent, Range } from "./range.js";
+import { between, Marked, readingsAt, told } from "./readings.js";
+import { newest, scaled, times } from "./snapshot.js";
 
 const CURSORS = "haploop";
-const DECIMALS = 3;
 // Where the charts lie one below the other, each has its times: that of the last is out of sight.
 const NARROW = matchMedia("(max-width: 699px)");
-const OVERLAY = { colour: "mark", width: 1 };
+// What the times below take of a chart's height, and a letter beside it.
+const [TIMES_PX, LETTER_PX] = [46, 6.2];
+const OVERLAY = { key: "overlay", line: { colour: "overlay", width: 1.2 } };
+// From so many pixels on, an interval of which only the extremes are kept is a box: a line would swing as nothing did.
+const BOX_PX = 4;
 
 export class TimeChart {
   /**
@@ -32,8 +36,10 @@ export class TimeChart {
     this.plot = host.appendChild(make("div", { class: "plot" }));
     this.lines = [];
     this.rough = [];
+    this.names = [];
+    this.isEnvelope = false;
     this.overlay = null;
-    this.fits = true;
+    this.marked = new Marked();
     this.columns = [];
     this.t = new Float64Array(0);
     this.span = [0, 1];
@@ -60,7 +66,7 @@ export class TimeChart {
 
   build() {
     this.u?.destroy();
-    const { label, times } = this.options;
+    const { times } = this.options;
     const series = this.lines.map(({ line, label: name, key }) => ({
       label: name,
       stroke: stroke(line),
@@ -70,6 +76,8 @@ export class TimeChart {
       auto: false,
       points: { show: false },
       paths: (u, i) => {
+        this.rough[i] = null;
+        if (this.isCoarse()) return { stroke: boxes(u, u.data[0], u.data[i]) };
         this.rough[i] = strips(u, u.data[0], u.data[i]);
         return this.rough[i] ? null : { stroke: linePath(u, u.data[0], u.data[i]) };
       },
@@ -83,7 +91,7 @@ export class TimeChart {
         y: { auto: false, range: () => this.range.now },
       },
       series: [{}, ...series],
-      axes: [times || NARROW.matches ? bottomAxis("simulated time (s)") : bareAxis(), leftAxis(named(label, this.unit.name))],
+      axes: [times || NARROW.matches ? bottomAxis("simulated time (s)") : bareAxis(), leftAxis(this.axisName())],
       cursor: {
         y: false,
         points: { show: false },
@@ -94,7 +102,8 @@ export class TimeChart {
       hooks: {
         drawSeries: [(u, i) => this.rough[i] && drawStrips(u, this.rough[i], this.lines[i - 1].line)],
         drawClear: [(u) => this.shade(u)],
-        draw: [(u) => this.layOver(u), (u) => drawMarks(u, this.marks), (u) => drawMeasured(u, this.viewport.measured)],
+        drawAxes: [(u) => drawMarks(u, this.marks)], // no line is covered by the name of a change
+        draw: [(u) => this.layOver(u), (u) => drawMeasured(u, this.viewport.measured)],
         setCursor: [() => this.tell()],
         setSelect: [(u) => this.select(u)],
       },
@@ -110,18 +119,20 @@ export class TimeChart {
    * @param {[number, number]} span first and last time, s.
    * @param {Float64Array} t times of the numbers, s.
    * @param {{key: string, label: string, line: object, values: ArrayLike<number>}[]} lines
-   * @param {object} more wall: {values, side} to shade, or null; marks; note for the end of the legend;
-   *   overlay: the table of another run, or null; fits: whether the axis has room for that one, too.
+   * @param {object} more isEnvelope: whether each two numbers are the extremes of one interval; wall: {values, side} to
+   *   shade, or null; marks; note for the end of the legend; overlay: {table, label, fits} of another run, or null, and
+   *   whether the axis has room for it.
    */
-  show(span, t, lines, { wall = null, marks = [], note = "", overlay = null, fits = true } = {}) {
+  show(span, t, lines, { isEnvelope = false, wall = null, marks = [], note = "", overlay = null } = {}) {
     const signature = (list) => JSON.stringify(list.map(({ key, label }) => [key, label]));
-    const isNew = signature(lines) !== signature(this.lines);
+    const names = overlay ? [...lines, { ...OVERLAY, label: overlay.label }] : lines;
+    const isNew = signature(names) !== signature(this.names);
     const climbs = this.climb(lines);
     const columns = lines.map(({ values }) => scaled(values, this.unit.factor));
-    Object.assign(this, { span, t, lines, wall, marks, note, overlay, fits, columns });
+    Object.assign(this, { span, t, lines, names, isEnvelope, wall, marks, note, overlay, columns });
     this.rerange();
     if (isNew || climbs) {
-      this.legend.name(lines);
+      this.legend.name(names);
       this.build();
     }
     this.draw();
@@ -137,7 +148,7 @@ export class TimeChart {
 
   rerange() {
     const shown = this.columns.filter((_, i) => this.legend.isShown(this.lines[i].key));
-    if (this.overlay && this.fits) shown.push(scaled(this.overlay.columns[0].values, this.unit.factor));
+    if (this.overlay?.fits && this.legend.isShown(OVERLAY.key)) shown.push(scaled(this.overlay.table.columns[0].values, this.unit.factor));
     this.range.follow(...extent(shown, this.options.zero && shown.length ? [0] : []));
   }
 
@@ -166,37 +177,49 @@ export class TimeChart {
     u.ctx.restore();
   }
 
-  /** The same quantity of another run, faintly. */
+  /** Whether only the extremes of intervals are known that are some pixels wide. */
+  isCoarse() {
+    const [begin, end] = this.span;
+    return this.isEnvelope && this.t.length > 1 && (2 * (this.t[1] - this.t[0]) * this.u.bbox.width) / (end - begin) >= BOX_PX * devicePixelRatio;
+  }
+
+  /** The same quantity of another run. */
   layOver(u) {
-    if (!this.overlay) return undefined;
-    const [t, values] = [times(this.overlay), scaled(this.overlay.columns[0].values, this.unit.factor)];
+    if (!this.overlay || !this.legend.isShown(OVERLAY.key)) return undefined;
+    const { table } = this.overlay;
+    const [t, values] = [times(table), scaled(table.columns[0].values, this.unit.factor)];
     const rough = strips(u, t, values);
-    if (rough) return drawStrips(u, rough, OVERLAY);
+    if (rough) return drawStrips(u, rough, OVERLAY.line);
     u.ctx.save();
     u.ctx.beginPath();
     u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
     u.ctx.clip();
-    u.ctx.strokeStyle = colour(OVERLAY.colour);
-    u.ctx.lineWidth = OVERLAY.width * devicePixelRatio;
+    u.ctx.setLineDash([]);
+    u.ctx.strokeStyle = colour(OVERLAY.line.colour);
+    u.ctx.lineWidth = OVERLAY.line.width * devicePixelRatio;
     u.ctx.stroke(linePath(u, t, values));
     return u.ctx.restore();
   }
 
-  /** The numbers under the cursor, or the last ones. */
+  /** What the lines read under the cursor, or at last: all of one time. */
   tell() {
-    if (!this.u) return;
-    const [begin, end] = this.viewport.measured;
-    const at = end === undefined ? this.u.cursor.idx : this.u.valToIdx(end);
-    if (begin !== undefined && at != null) return this.measure(this.u.valToIdx(begin), at);
-    const texts = this.columns.map((values) => steady(at == null ? last(values) : values[at], DECIMALS));
-    const time = at == null ? "" : `at ${steady(this.t[at], 4)} s`;
-    return this.legend.tell(texts, time || this.note);
+    if (!this.u) return undefined;
+    const { t, lines, isEnvelope, unit: { factor } } = this;
+    const at = this.u.cursor.idx;
+    const here = at == null || at >= t.length ? null : readingsAt(t, lines, at, isEnvelope);
+    const [one, other = here] = this.marked.look(this.viewport.measured, t, lines, isEnvelope, (mark) => this.u.valToIdx(mark));
+    if (one && other) return this.measure(between(one, other));
+    if (here) return this.legend.tell(lines.map(({ key }) => told(here.values.get(key), factor)), `at ${steady(here.t, 4)} s`);
+    return this.legend.tell(lines.map((line) => told([newest(line), newest(line)], factor)), this.note || this.coarseness());
   }
 
-  /** The differences between two rows. */
-  measure(from, to) {
-    const texts = this.columns.map((values) => `Δ ${steady(values[to] - values[from], DECIMALS)}`);
-    const time = this.t[to] - this.t[from];
+  coarseness() {
+    return this.isCoarse() ? `only ranges of ${amount(2 * (this.t[1] - this.t[0]), "s")} kept` : "";
+  }
+
+  /** Time and differences; of lines of which no single sample is known, between which they lie. */
+  measure({ time, of }) {
+    const texts = this.lines.map(({ key }) => `Δ ${told(of(key), this.unit.factor)}`);
     this.legend.tell(texts, `Δ ${steady(time, 4)} s${time ? `, ${amount(Math.abs(1 / time), "Hz")}` : ""}`);
   }
 
@@ -210,8 +233,16 @@ export class TimeChart {
     return { width: Math.max(120, this.plot.clientWidth), height: Math.max(60, this.plot.clientHeight) };
   }
 
+  /** What stands along the left axis: the unit alone where the chart is too low for more. */
+  axisName() {
+    const name = named(this.options.label, this.unit.name);
+    const high = this.size().height - (this.options.times || NARROW.matches ? TIMES_PX : 0);
+    return this.options.label && high < LETTER_PX * name.length ? this.unit.name : name;
+  }
+
   resize() {
     const size = this.size();
+    this.u.axes[1].label = this.axisName();
     if (size.width !== this.u.width || size.height !== this.u.height) this.u.setSize(size);
   }
 }
