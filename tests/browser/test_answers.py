@@ -4,8 +4,8 @@ import pytest
 from playwright.sync_api import expect
 
 from helpers.live.browser import still
-from helpers.live.stand_in import ENDED, RUNNING, SUMMARY, WAITING
-from oracles.snapshots import contact
+from helpers.live.stand_in import ENDED, RUNNING, RUNS, SUMMARY, WAITING
+from oracles.snapshots import contact, snapshot
 
 
 @pytest.mark.slow
@@ -20,6 +20,31 @@ def test_without_a_run_it_says_how_to_start_one_and_offers_nothing_that_steers(s
     expect(page.locator("#verdict span")).to_have_text("no verdict")
     assert "NaN" not in page.inner_text("body")
     assert "null" not in page.inner_text("body")
+
+
+def test_a_run_that_never_began_is_told_and_before_the_first_tick_no_loop_is_denied(stand_in, open_page):
+    stand_in.tell(WAITING | {"why": "Run ab ended before its first tick."})
+    page = open_page(stand_in.url)
+    expect(page.locator("#notice")).to_have_text("Run ab ended before its first tick.")
+    for hidden in (".beside", "#scrub"):
+        assert page.locator(hidden).evaluate("e => getComputedStyle(e).visibility") == "hidden"
+    stand_in.state(tick=0)
+    stand_in.show(snapshot(0.0, 2.0))
+    expect(page.locator("#no-ticks")).to_be_visible()
+    assert page.locator("#loop .absent").evaluate("e => getComputedStyle(e).visibility") == "hidden"
+    stand_in.show(contact())
+    expect(page.locator("#no-ticks")).to_be_hidden()
+    assert page.locator("#energy .plot").evaluate("e => getComputedStyle(e).visibility") == "visible"
+
+
+def test_a_run_that_is_over_offers_nothing_live_and_says_whether_the_next_one_comes(stand_in, page):
+    page.click("#freeze")
+    expect(page.locator("#freeze")).to_have_text("Go live")
+    stand_in.state(**ENDED)
+    expect(page.locator("#freeze")).to_have_text("To its end")
+    expect(page.locator("#notice")).to_have_text("The run has ended. The next one will come up here by itself.")
+    stand_in.tell(RUNS | {"stays": True})
+    expect(page.locator("#notice")).to_have_text("The run has ended.")
 
 
 @pytest.mark.slow
@@ -97,7 +122,9 @@ def test_no_verdict_of_steady_stands_alone_beside_what_moves_still(stand_in, pag
 
 def test_the_force_that_ripples_in_the_run_and_that_of_its_pushed_copies_are_told_apart(stand_in, page):
     window = {"window": {"force_ripple_N": 0.2}}
-    stand_in.state(**ENDED | {"summary": SUMMARY | window | {"stability": SUMMARY["stability"] | {"force_ripple_N": 0.0}}})
+    stand_in.state(
+        **ENDED | {"summary": SUMMARY | window | {"stability": SUMMARY["stability"] | {"force_ripple_N": 0.0}}}
+    )
     expect(page.locator("#summary")).to_contain_text("pushed, it ripples0 N above 30 Hz")
     expect(page.locator("#summary")).to_contain_text("its own force ripples200 mN above 30 Hz")
 
@@ -201,7 +228,7 @@ def test_the_next_run_takes_the_place_of_the_one_that_has_ended_and_is_shown_liv
     stand_in.show(contact())
     page = open_page(stand_in.url)
     page.click("#freeze")
-    expect(page.locator("#freeze")).to_have_text("Go live")
+    expect(page.locator("#freeze")).to_have_text("To its end")
     stand_in.state(run="def456", title="another", tick=10)
     expect(page.locator("#title")).to_have_text("another")
     expect(page.locator("#freeze")).to_have_text("Freeze")

@@ -41,7 +41,7 @@ def test_a_run_drawn_behind_that_diverged_leaves_the_axis_to_the_run_on_show(sta
     (drawn,) = seen(page, "position", [0.8], "ink")
     assert drawn
     assert (drawn[0] < 0.4) == diverged, drawn
-    expect(page.locator("#position .legend .name").last).to_have_text("over: wall-1")
+    expect(page.locator("#position .legend .name").last).to_have_text("over: first wall")
     over = "#position .legend button:has-text('over')"
     assert seen(page, "position", [0.002 if diverged else 0.8], "overlay")[0], "in a colour of its own"
     page.click(over)

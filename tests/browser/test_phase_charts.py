@@ -25,7 +25,9 @@ def test_without_wall_or_inertia_the_loops_say_that_there_is_none(stand_in, page
 def test_where_only_extremes_are_kept_no_wall_is_denied_and_no_line_swings_between_them(stand_in, page):
     """Intervals of 0.1 s between the same two extremes: a line through them would go up and down as nothing did."""
     rows = [(0.0, 0.01)[i % 2] for i in range(40)]
-    stand_in.show(snapshot(0.0, 2.0, table("position", 0.025, 0.05, ("x", "m", "position", rows), envelope=True), coarse=True))
+    stand_in.show(
+        snapshot(0.0, 2.0, table("position", 0.025, 0.05, ("x", "m", "position", rows), envelope=True), coarse=True)
+    )
     expect(page.locator("#position .note")).to_have_text("only ranges of 100 ms kept")
     expect(page.locator("#loop .absent")).to_contain_text("least and greatest of each interval")
     expect(page.locator("#momentum .absent")).to_contain_text("least and greatest of each interval")

@@ -178,7 +178,8 @@ def test_on_a_phone_a_title_is_read_whole_and_a_verdict_with_a_proviso_keeps_its
         "verdict": "steady",
         "stability": {"provisos": ["by friction alone", "while the hand holds on"]},
     }
-    stand_in.state(**ENDED | {"verdict": "steady", "summary": judged})
+    rests = RUNNING["sight"] | {"word": "no swing seen"}
+    stand_in.state(**ENDED | {"verdict": "steady", "summary": judged, "sight": rests})
     expect(page.locator("#seen")).to_have_text("by friction alone, while the hand holds on")
     sign, word = (page.locator(f"#verdict {part}").bounding_box() for part in ("svg", "span"))
     assert 0 < word["x"] - sign["x"] - sign["width"] < 12

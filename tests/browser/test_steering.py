@@ -152,6 +152,30 @@ def test_what_the_run_refuses_is_told_beside_the_field_that_it_names(stand_in, p
     assert page.input_value("#swap-kind") == "damping"
 
 
+def test_a_fault_that_names_no_field_is_pinned_to_none_and_an_element_taken_back_is_told_as_a_failure(stand_in, page):
+    options = {
+        **OPTIONS,
+        "kinds": {"bad": {"about": "", "parameters": {"b": OPTIONS["kinds"]["damping"]["parameters"]["damping"]}}},
+    }
+    stand_in.state(options=options, run="other")
+    expect(page.locator("#swap-b")).to_be_visible()
+    stand_in.answer = lambda command: (False, "RuntimeError: boom")
+    page.fill("#swap-b", "3")
+    page.click("#swap-do")
+    expect(page.locator("#swap-problem")).to_have_text("RuntimeError: boom")
+    expect(page.locator("#swap-b-problem")).to_be_empty()
+    stand_in.answer = lambda command: (False, "dissipation.0.b is above 1.")
+    page.click("#swap-do")
+    expect(page.locator("#swap-b-problem")).to_have_text("dissipation.0.b is above 1.")
+    stand_in.answer = lambda command: (True, "element 0 becomes bad; to go back: swap none")
+    page.click("#swap-do")
+    expect(page.locator("#said")).to_have_text("element 0 becomes bad")
+    fault = {"tick": 9, "t_s": 0.009, "kind": "restored", "text": "Element 0 gave no force. It is removed."}
+    stand_in.tell({"type": "events", "events": [fault]})
+    expect(page.locator("#said")).to_have_text("Taken back: Element 0 gave no force. It is removed.")
+    expect(page.locator("#said")).to_have_attribute("data-ok", "false")
+
+
 @pytest.mark.slow
 def test_what_the_run_refuses_without_naming_a_field_is_told_in_the_form(stand_in, page):
     stand_in.answer = lambda command: (False, "The run ends at tick 3000, 3 s; nothing can change from there on.")

@@ -71,7 +71,9 @@ def test_what_was_measured_stays_when_its_marks_are_moved_out_of_sight(stand_in,
 
 def test_where_a_pixel_covers_many_samples_a_range_is_read_and_at_last_one_sample_of_all(stand_in, page):
     ends = [(-0.0625, -0.0575)[i % 2] for i in range(2000)]
-    many = table("position", 0.0, 0.001, ("x", "m", "position", ends), ("wall", "m", "wall", [-0.06] * 2000), envelope=True)
+    many = table(
+        "position", 0.0, 0.001, ("x", "m", "position", ends), ("wall", "m", "wall", [-0.06] * 2000), envelope=True
+    )
     stand_in.show(snapshot(0.0, 2.0, {**many, "last": [-0.0612, -0.06]}))
     expect(page.locator("#position .legend output")).to_have_text(["−61.200", "−60.000"])
     box = page.locator("#position .u-over").bounding_box()
@@ -104,13 +106,15 @@ def test_picture_and_numbers_are_saved_as_files(stand_in, page, tmp_path):
 def test_another_live_run_is_told_and_any_run_can_be_opened_or_drawn_over(stand_in, page):
     expect(page.locator("#runs")).to_be_hidden()
     stand_in.tell(RUNS)
-    expect(page.locator("#others")).to_have_text("1 other run is live")
-    expect(page.locator("#run option")).to_have_text(["abc123: one", "def456: two", "wall-1"])
+    expect(page.locator("#how-many")).to_have_text("1 other run is live")
+    names = ["one (abc123)", "two (def456)", "first wall, steady, 1 Jan 12:00 (wall-1)"]
+    expect(page.locator("#run option")).to_have_text(names)
+    assert order(stand_in, page, lambda: page.click("#open-other")) == ("open", {"run": "def456"})
     assert page.input_value("#run") == "abc123"
     opened = order(stand_in, page, lambda: page.select_option("#run", "def456"))
     assert opened == ("open", {"run": "def456"})
     stand_in.tell({**RUNS, "shown": "fed987"})
-    expect(page.locator("#run option").last).to_have_text("fed987: ended")
+    expect(page.locator("#run option").last).to_have_text("one, ended (fed987)")
     assert page.input_value("#run") == "fed987", "what has ended is on show still"
     over = order(stand_in, page, lambda: page.select_option("#overlay", "wall-1"))
     assert over == ("overlay", {"run": "wall-1"})
@@ -145,6 +149,10 @@ def test_a_slider_sets_when_it_is_let_go_and_shades_what_lies_beyond_the_limit(s
         page.keyboard.press("ArrowRight")
     coarse = pytest.approx(150 * 10 ** (3 / 200), rel=0.01)
     stand_in.ordered(lambda command: command["arguments"]["set"]["wall.stiffness"] == coarse)
+    stand_in.state(no_limit="not linear, by [friction]")
+    expect(page.locator("#set-fields p:has([id='set-wall.stiffness'])")).to_contain_text(
+        "no limit is shaded: not linear, by [friction]"
+    )
     assert OPTIONS["settable"]["wall.position"]["value"] < 0
     expect(page.locator("input[aria-label='wall.position, coarse']")).to_be_hidden()
 

@@ -1,6 +1,8 @@
 """Recorded runs on the page: found, opened, drawn over another, and refused by a sentence where they are not there."""
 
+import asyncio
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -71,12 +73,90 @@ def test_a_viewer_shows_one_recorded_run_and_draws_another_over_it(recorded):
     assert "overlay_position" not in late
 
 
+def test_recorded_runs_are_listed_by_name_verdict_and_date_and_one_that_cannot_be_read_by_its_folder(
+    recorded, tmp_path
+):
+    runs = LiveRuns()
+    first, second = (next(past for past in runs.past() if past.id == name) for name in ("first", "second"))
+    assert second.title == recorded.summary["title"]
+    assert second.told.startswith(f"{recorded.summary['verdict']}, ")
+    (tmp_path / "runs/first/summary.json").write_text("{")
+    damaged = next(past for past in runs.past() if past.id == "first")
+    assert (first.title, damaged.title) == (recorded.summary["title"], "first")
+    assert next(past for past in runs.past() if past.id == "second") is second, "it is read once"
+
+
+def test_a_run_that_has_ended_is_listed_once_as_the_recorded_one_that_it_is(recorded):
+    async def play():
+        viewer = Viewer(LiveRuns(), None, from_start=True)
+        viewer.listing()
+        session = PastSession(LiveRuns().past()[0])
+        session.run = SimpleNamespace(id="f1cd5e", title="second run")  # as it was followed
+        viewer.session = viewer._followed = session
+        assert viewer.listing()["shown"] == "second"
+        await viewer.open("first")
+        await viewer.open("second")
+        assert viewer.session is session, "what was received of it is shown still"
+
+    to_its_end(play())
+
+
+class Live:
+    """Live runs that come and go as a test wants."""
+
+    def __init__(self, *names):
+        self.names = [*names]
+
+    def live(self):
+        return [SimpleNamespace(id=name, title=f"run {name}") for name in self.names]
+
+    def past(self):
+        return []
+
+
+def test_a_page_that_stays_with_its_run_takes_up_another_only_where_it_is_chosen():
+    async def play():
+        runs = Live("other", "own")
+        viewer = Viewer(runs, "own", from_start=True, stays=True)
+        assert (await viewer._next_run()).id == "own"
+        runs.names = ["other", "new"]
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(viewer._next_run(), 0.5)
+        assert viewer.listing()["stays"]
+        await viewer.open("other")
+        assert (await viewer._next_run()).id == "other"
+
+    to_its_end(play())
+
+
+def test_of_a_run_that_ended_before_its_first_tick_the_page_says_so():
+    async def play():
+        runs = Live("own")
+        viewer = Viewer(runs, None, from_start=True)
+        own = await viewer._next_run()
+        runs.names = []
+        assert await viewer._join(own) is None
+        runs.names = ["later"]
+
+        async def gone(run):
+            runs.names = []
+
+        viewer._join = gone
+        following = asyncio.create_task(viewer.follow_runs())
+        while not viewer.why:
+            await asyncio.sleep(0.01)
+        following.cancel()
+        assert viewer.why == 'Run later, "run later", ended before its first tick; its terminal says why.'
+
+    to_its_end(play())
+
+
 def test_a_loop_with_an_element_that_is_not_installed_has_no_limit_of_stiffness(recorded):
     scene = recorded_scene(LiveRuns().past()[0].out, {})
     assert scene
     assert LiveRuns().stiffness_limit(replace(scene, dissipation=()))
     unknown = replace(scene, dissipation=(replace(scene.dissipation[0], name="of a plugin"),))
-    assert LiveRuns().stiffness_limit(unknown) is None
+    assert LiveRuns().stiffness_limit(unknown) == "an element that is not known here"
 
 
 def test_what_cannot_be_read_is_refused_and_what_was_shown_stays(recorded, tmp_path):

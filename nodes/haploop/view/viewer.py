@@ -14,7 +14,7 @@ from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.receive.ingest import Backfill
 from haploop.view.receive.past_session import PastSession
 from haploop.view.receive.run_session import RunSession
-from haploop.view.receive.runs import CommandFailed, Run, Runs
+from haploop.view.receive.runs import CommandFailed, PastRun, Run, Runs
 
 # Updates a second: telemetry is received and shown so often.
 UPDATE_HZ = 31.5
@@ -36,18 +36,22 @@ class Viewer:
     Args:
         first: id of the run to follow first; the newest there is when None.
         from_start: whether what was logged before joining is shown as well.
+        stays: whether another run is followed only when it is chosen.
 
     Attributes:
         session: the run on show; None before the first.
         overlay: a recorded run that is drawn behind it; None without.
+        why: why there is none on show, a sentence, if there is one.
     """
 
-    def __init__(self, runs: Runs, first: str | None, from_start: bool) -> None:
-        self._runs, self._first, self._from_start = runs, first, from_start
+    def __init__(self, runs: Runs, first: str | None, from_start: bool, stays: bool = False) -> None:
+        self._runs, self._first, self._from_start, self._stays = runs, first, from_start, stays
         self._known: set[str] = set()
         self._updated = asyncio.Event()
         self.session: RunSession | None = None
         self.overlay: RunSession | None = None
+        self.why = ""
+        self._past: Sequence[PastRun] = ()
         self._followed: RunSession | None = None
         self._listed: tuple[float, Message] = -math.inf, {}
         self._made: dict[tuple[tuple[object, ...], bool], bytes] = {}
@@ -77,8 +81,10 @@ class Viewer:
 
     async def follow_runs(self) -> None:
         while True:
-            session = await self._join(await self._next_run())
+            run = await self._next_run()
+            session = await self._join(run)
             if session is None:
+                self.why = f'Run {run.id}, "{run.title}", ended before its first tick; its terminal says why.'
                 continue
             self.session = self._followed = session
             tasks = [asyncio.create_task(session.clock.keep_asking())]
@@ -96,25 +102,34 @@ class Viewer:
     def listing(self) -> Message:
         """Returns the live runs, the recorded ones, and which are on show, looked for now and then.
 
-        ``overlay_diverged`` tells of the one drawn behind whether its numbers left every bound.
+        ``overlay_diverged`` tells of the one drawn behind whether its numbers left every bound, ``stays`` whether the
+        page keeps its run when that has ended.
         """
         if wall_clock.monotonic() - self._listed[0] > _LIST_S:
-            named = {
-                kind: [{"id": run.id, "title": run.title} for run in runs]
-                for kind, runs in (("live", self._runs.live()), ("past", self._runs.past()))
+            live, self._past = self._runs.live(), self._runs.past()
+            named: Message = {
+                "live": [{"id": run.id, "title": run.title} for run in live],
+                "past": [{"id": run.id, "title": run.title, "told": run.told} for run in self._past],
             }
             self._listed = wall_clock.monotonic(), named
         behind = self.overlay and self.overlay.summary
         shown = {
-            "shown": self.session and self.session.run.id,
+            "shown": self.session and self._listed_as(self.session),
+            "title": self.session and self.session.scene.title,
+            "stays": self._stays,
             "overlay": self.overlay and self.overlay.run.id,
             "overlay_diverged": bool(behind) and behind["verdict"] == "diverged",
         }
         return {"type": "runs", **self._listed[1], **shown}
 
+    def _listed_as(self, session: RunSession) -> str:
+        """Returns the id of a run in the list: that of its folder once it is over and recorded there."""
+        found = [run.id for run in self._past if session.outcome and run.out.resolve() == session.out.resolve()]
+        return found[0] if found else session.run.id
+
     async def open(self, run_id: str) -> str:
         """Puts a live or a recorded run on show, for all pages; raises CommandFailed where there is none of that id."""
-        if self._followed and self._followed.run.id == run_id:
+        if self._followed and self._listed_as(self._followed) == run_id:
             self.session = self._followed
         elif run_id in [run.id for run in self._runs.live()]:
             self._known.discard(run_id)
@@ -149,7 +164,8 @@ class Viewer:
             await self._idle(_LOOK_S)
 
     def _fresh(self, live: Sequence[Run]) -> list[Run]:
-        return [run for run in live if run.id not in self._known]
+        fresh = [run for run in live if run.id not in self._known]
+        return [run for run in fresh if self._first and run.id.startswith(self._first)] if self._stays else fresh
 
     async def _idle(self, seconds: float) -> None:
         """Updates pages while no telemetry comes: one may have changed its viewport."""

@@ -97,8 +97,8 @@ ENDED = {
 }  # fmt: skip
 RUNS = {
     "type": "runs", "live": [{"id": "abc123", "title": "one"}, {"id": "def456", "title": "two"}],
-    "past": [{"id": "wall-1", "title": "wall-1"}], "shown": "abc123", "overlay": None,
-    "overlay_diverged": False,
+    "past": [{"id": "wall-1", "title": "first wall", "told": "steady, 1 Jan 12:00"}],
+    "shown": "abc123", "overlay": None, "overlay_diverged": False, "title": "one", "stays": False,
 }  # fmt: skip
 
 

@@ -129,7 +129,8 @@ def state(session: RunSession) -> Message:
             **({"kind": wall.kind} if wall.kind else {}),
         },
         "delay_s": session.delay_s,
-        "limit_N_m": session.clock.limit_N_m,
+        "limit_N_m": None if isinstance(session.clock.limit, str) else session.clock.limit,
+        "no_limit": session.clock.limit if isinstance(session.clock.limit, str) else "",
         "summary": summary,
         "sight": sight and dataclasses.asdict(sight),
     }

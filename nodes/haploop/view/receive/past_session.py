@@ -31,7 +31,7 @@ class PastSession(RunSession):
         keys = {key for _, event in self.events for key in event.get("set", {})}
         at_work = [span.scene for span in spans(scene, changes_of(self.events))]
         units = {key: unit for now in at_work for key, unit in run.units(now, keys).items()}
-        self.clock = SimpleNamespace(status={}, options=None, limit_N_m=None, units=units)  # nobody is there to answer
+        self.clock = SimpleNamespace(status={}, options=None, limit=None, units=units)  # nobody is there to answer
         self.outcome, self.given_up = "ended", True
         backfill = Backfill(self.out, scene, time, self.events)
         backfill.read()

@@ -47,10 +47,12 @@ class Run(Protocol):
 
 
 class PastRun(Run, Protocol):
-    """A recorded run that is over; ``out`` is its folder."""
+    """A recorded run that is over; ``out`` is its folder, ``told`` what came of it and when, in few words."""
 
     @property
     def out(self) -> Path: ...
+    @property
+    def told(self) -> str: ...
 
     def scene(self) -> Scene:
         """Reads its resolved scene; raises OSError or LogError where there is none."""
@@ -72,8 +74,8 @@ class Runs(Protocol):
         """Returns recorded runs that may be opened, the newest first."""
         ...
 
-    def stiffness_limit(self, scene: Scene) -> float | None:
-        """Returns the largest wall stiffness at which a loop stays stable, N/m, of its linear map; None for none."""
+    def stiffness_limit(self, scene: Scene) -> float | str | None:
+        """Returns the largest wall stiffness at which a loop stays stable by its linear map, N/m, or why none is."""
         ...
 
     def has_launcher(self, run: Any) -> bool:
@@ -91,12 +93,12 @@ class ClockAnswers:
     Attributes:
         status: the answer to ``status``, {} before the first.
         options: what can be changed; None before the first answer.
-        limit_N_m: the largest stiffness that its wall may have in the loop as it is; None where there is no limit.
+        limit: the largest stiffness that its wall may have in the loop as it is, N/m, or why none is known.
     """
 
     def __init__(self, runs: Runs, run: Run, events: Sequence[tuple[int, Event]], scene: Scene) -> None:
         self._runs, self._run, self._events, self._scene = runs, run, events, scene
-        self.limit_N_m: float | None = None
+        self.limit: float | str | None = None
         self._ask_now = asyncio.Event()
         self.status: Message = {}
         self.options: Message | None = None
@@ -115,7 +117,7 @@ class ClockAnswers:
                     _, self.options = await self._ask("options", {})
                     seen = changes
                     now = at_work(self._scene, changes_of(self._events))
-                    self.limit_N_m = await asyncio.to_thread(self._runs.stiffness_limit, now)
+                    self.limit = await asyncio.to_thread(self._runs.stiffness_limit, now)
             self._ask_now.clear()
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._ask_now.wait(), _ASK_S)

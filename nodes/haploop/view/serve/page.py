@@ -125,7 +125,7 @@ class Page:
         version = session and (session, session.version)
         if version != self._sent_state or now >= self._state_due:
             self._sent_state, self._state_due = version, now + _STATE_S
-            await self._send(state(session) if session else WAITING)
+            await self._send(state(session) if session else WAITING | {"why": self._viewer.why})
             if (listing := self._viewer.listing()) != self._sent_listing:
                 self._sent_listing = listing
                 await self._send(listing)

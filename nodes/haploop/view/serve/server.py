@@ -127,14 +127,15 @@ async def serve(
     end: asyncio.Event,
     first: str | None = None,
     from_start: bool = True,
+    stays: bool = False,
     until_closed: bool = False,
 ) -> None:
     """Serves the page until SIGINT, SIGTERM or ``end``, or until every page that was open has been closed.
 
-    Runs, first and from_start are those of :class:`Viewer`.
+    Runs, first, from_start and stays are those of :class:`Viewer`.
     """
     guard = Guard(listening.getsockname()[1])
-    viewer = Viewer(runs, first, from_start)
+    viewer = Viewer(runs, first, from_start, stays)
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):  # not in the main thread

@@ -46,12 +46,24 @@ class RecordedRun:
 
     id: str
     out: Path
+    title: str
+    told: str
     clock: str = ""
     is_here: bool = True
 
-    @property
-    def title(self) -> str:
-        return self.id
+    @classmethod
+    def of_summary(cls, file: Path, ended_s: float) -> RecordedRun:
+        """Makes it of its summary, written at a time in s; of one that cannot be read its folder's name is told."""
+        from haploop.logger.log import LogError
+        from haploop.logger.summary import read
+
+        name, when = file.parent.name, time.strftime("%d %b %H:%M", time.localtime(ended_s))
+        try:
+            summary = read(file)
+            told = [summary["verdict"], *summary.get("stability", {}).get("provisos", ()), when]
+            return cls(name, file.parent, summary.get("title") or name, ", ".join(told))
+        except (LogError, KeyError):
+            return cls(name, file.parent, name, when)
 
     def scene(self) -> Scene:
         """Reads its resolved scene; raises OSError where there is none."""
@@ -83,6 +95,7 @@ class LiveRuns:
 
     def __init__(self, only: LiveRun | None = None) -> None:
         self._only = only
+        self._recorded: dict[tuple[Path, float], RecordedRun] = {}
 
     def live(self) -> Sequence[LiveRun]:
         """Returns the runs that live now, the oldest first."""
@@ -94,19 +107,28 @@ class LiveRuns:
         """Returns the recorded runs in ./runs that have a summary, the newest first; of a run elsewhere none."""
         if self._only:
             return []
-        found = sorted(Path(_RUNS).glob("*/summary.json"), key=lambda file: file.stat().st_mtime, reverse=True)
-        return [RecordedRun(file.parent.name, file.parent) for file in found[:_MOST_PAST]]
+        found = sorted(((file.stat().st_mtime, file) for file in Path(_RUNS).glob("*/summary.json")), reverse=True)
+        now = {(file, ended_s) for ended_s, file in found[:_MOST_PAST]}
+        self._recorded = {key: run for key, run in self._recorded.items() if key in now}
+        for key in now - self._recorded.keys():
+            self._recorded[key] = RecordedRun.of_summary(*key)
+        return [self._recorded[file, ended_s] for ended_s, file in found[:_MOST_PAST]]
 
-    def stiffness_limit(self, scene: Scene) -> float | None:
-        """Returns the largest stiffness with which the linear map of a loop is stable, N/m; None where it has none."""
+    def stiffness_limit(self, scene: Scene) -> float | str:
+        """Returns the largest stiffness with which the linear map of a loop is stable, N/m, or why there is none."""
         from haploop.controller.dissipation.element import ElementError
-        from haploop.tools.linear.one_tick import OneTickMap
+        from haploop.tools.linear.linearity import why_not_linear
+        from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 
         try:
+            if curved := why_not_linear(scene):
+                return f"not linear, by {' and '.join(curved)}"
             limit = OneTickMap.from_scene(scene).stiffness_limit()
-        except (ElementError, ValueError, KeyError, ArithmeticError):  # not linear, never stable, or a plugin's element
-            return None
-        return limit if math.isfinite(limit) else None
+        except NeverStable:
+            return "unstable with the softest wall"
+        except (ElementError, ValueError, KeyError, ArithmeticError):
+            return "an element that is not known here"
+        return limit if math.isfinite(limit) else "stable with any wall"
 
     def has_launcher(self, run: LiveRun) -> bool:
         """Returns whether the process that started a run is there, which judges it in the end."""
@@ -171,6 +193,7 @@ def view(
             listening,
             first=shown and shown.id,
             from_start=since == "start",
+            stays=led,  # with --view the page is that of its run
             on_serving=serving,
             end=end,
             until_closed=until_closed,

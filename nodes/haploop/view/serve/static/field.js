@@ -125,7 +125,8 @@ export function firstWrong(fields) {
 
 /** Show a refusal beside the field it names, or else in the form's own place. */
 export function refuse(text, fields, place) {
-  const named = fields.find(({ name }) => text.includes(name));
+  const words = text.match(/[\w.-]+/g) ?? [];
+  const named = fields.find(({ name }) => words.some((word) => `.${word.replace(/\.$/, "")}`.endsWith(`.${name}`)));
   if (named) {
     named.complain(text);
     named.input.focus();

@@ -28,6 +28,7 @@ let marks = [];
 let snapshot = null;
 let whole = {};
 let drawn = 0;
+let told = 0;
 const waiting = [];
 
 const phase = () => (connected ? state.phase : "lost");
@@ -94,20 +95,24 @@ function showState() {
   byId("nothing-yet").hidden = goesOn || Boolean(state.summary);
   if (state.options) {
     swapForm.update(state.options);
-    setForm.update(state.options, state.limit_N_m);
+    setForm.update(state.options, state);
   }
-  allow(phase(), state.why);
+  allow(phase(), state.why, runs.listing?.stays);
+  view.update(!["running", "paused"].includes(phase()));
 }
 
 const showSoon = seldom(showState); // with the texts of the charts, in one picture
 
 function onRuns(listing) {
   runs.update(listing);
+  showSoon();
 }
 
 function onEvents(events) {
   marks = marksOf(events);
   showEvents(events, viewport);
+  for (const { kind, text } of events.slice(told)) if (kind === "restored") say({ ok: false, text, what: "Taken back" });
+  told = events.length;
   redraw();
 }
 
@@ -120,6 +125,7 @@ function draw() {
   snapshot = decode(waiting.shift());
   if (snapshot.beside === false) snapshot = { ...whole, ...snapshot, tables: { ...whole.tables, ...snapshot.tables } };
   else whole = snapshot;
+  document.body.toggleAttribute("data-blank", Object.keys(snapshot.tables).length === 0);
   stream.send({ type: "drawn" }); // the next one is made meanwhile
   if (waiting.length) requestAnimationFrame(draw);
   drawn += 1;

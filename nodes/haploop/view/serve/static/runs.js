@@ -1,12 +1,13 @@
 // The runs there are: live ones and those that were recorded. One is on show, another may be drawn behind it.
 
-import { byId, make } from "./dom.js";
+import { byId, make, put } from "./dom.js";
 
 export class RunChoice {
   /** @param {import("./steering.js").Steering} steering carries the choice: it is that of all pages of this viewer. */
   constructor(steering) {
     this.known = "";
     byId("run").addEventListener("change", () => this.choose(steering, "open", byId("run")));
+    byId("open-other").addEventListener("click", () => this.choose(steering, "open", byId("open-other")));
     byId("overlay").addEventListener("change", () => this.choose(steering, "overlay", byId("overlay")));
   }
 
@@ -18,9 +19,9 @@ export class RunChoice {
   /** Follow what the viewer lists. */
   update(listing) {
     this.listing = listing;
-    const { live, past, shown } = listing;
+    const { live, past, shown, title } = listing;
     // One that has ended stays on show, though nobody can open it again by this name.
-    const over = shown && ![...live, ...past].some(({ id }) => id === shown) ? [{ id: shown, title: "ended" }] : [];
+    const over = shown && ![...live, ...past].some(({ id }) => id === shown) ? [{ id: shown, title: title ?? shown, told: "ended" }] : [];
     const known = JSON.stringify([live, past, over]);
     if (known !== this.known) {
       this.known = known;
@@ -41,12 +42,18 @@ export class RunChoice {
     const { shown, overlay } = this.listing;
     if (document.activeElement !== byId("run")) byId("run").value = shown ?? "";
     if (document.activeElement !== byId("overlay")) byId("overlay").value = overlay ?? "";
-    const others = this.listing.live.filter(({ id }) => id !== shown).length;
-    byId("others").hidden = others === 0;
-    byId("others").textContent = others === 1 ? "1 other run is live" : `${others} other runs are live`;
+    const others = this.listing.live.filter(({ id }) => id !== shown);
+    byId("others").hidden = others.length === 0;
+    put(byId("how-many"), others.length === 1 ? "1 other run is live" : `${others.length} other runs are live`);
+    byId("open-other").value = others.at(-1)?.id ?? "";
+    byId("open-other").title = others.at(-1)?.title ?? "";
   }
 }
 
-const option = ({ id, title }) => make("option", { value: id }, title === id ? id : `${id}: ${title}`);
+/** The name comes first: what follows it may be cut off. */
+const option = ({ id, title, told }) => {
+  const words = [title, told].filter(Boolean).join(", ");
+  return make("option", { value: id, title: words }, title === id ? words : `${words} (${id})`);
+};
 
 const group = (label, runs) => make("optgroup", { label }, ...runs.map(option));

@@ -26,14 +26,17 @@ export class SetForm {
   }
 
   /** Follow the run: the keys that can be set and their present values. What is being typed stays. */
-  update({ settable }, limit_N_m = null) {
+  update({ settable }, { limit_N_m, no_limit } = {}) {
     const known = JSON.stringify(Object.entries(settable).map(([key, { value, ...quantity }]) => [key, quantity]));
     if (known !== this.known) {
       this.known = known;
       this.rebuild(settable);
     }
     for (const field of this.fields) field.show(settable[field.name].value);
-    for (const slider of this.sliders) slider.show(settable[slider.field.name].value, slider.field.name === STIFFNESS ? limit_N_m : null);
+    for (const slider of this.sliders) {
+      const limit = slider.field.name === STIFFNESS ? [limit_N_m ?? null, no_limit] : [];
+      slider.show(settable[slider.field.name].value, ...limit);
+    }
     this.note();
   }
 

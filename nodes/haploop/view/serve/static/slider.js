@@ -1,7 +1,7 @@
 // A slider beside a number above zero: from a tenth to ten times of it, the part beyond the loop's limit shaded.
 
 import { amount, plain } from "./amounts.js";
-import { make } from "./dom.js";
+import { make, put } from "./dom.js";
 
 const STEPS = 200;
 const DIGITS = 3;
@@ -21,11 +21,13 @@ export class Slider {
       field.input.dispatchEvent(new Event("input", { bubbles: true }));
     });
     this.input.addEventListener("change", released);
-    field.element.append(this.input);
+    this.why = make("span", { class: "unit" });
+    field.element.append(this.input, this.why);
   }
 
-  /** The number as it is, and the limit it has, in SI; no slider for a number that is not above zero. */
-  show(value, limit = null) {
+  /** The number as it is, and the limit it has, in SI, or why none is known; no slider for a number that is not above zero. */
+  show(value, limit = null, why = "") {
+    put(this.why, why ? `no limit is shaded: ${why}` : "");
     this.input.hidden = !(value > 0);
     if (this.input.hidden) return;
     if (!this.field.touched && (this.centre === 0 || Math.abs(Math.log10(value / this.centre)) > 0.7)) this.centre = value;

@@ -24,7 +24,7 @@ export class Sound {
     else this.context.suspend();
     byId("sound").setAttribute("aria-pressed", String(on));
     this.viewport.listen(on);
-    if (on) say({ ok: true, text: "Sound is on: the force on the device, as fast as the run goes." });
+    say({ ok: true, text: on ? "Sound is on: the force on the device, as fast as the run goes." : "" });
   }
 
   /** Play what has come since the last time. */

@@ -7,18 +7,18 @@ const WATCHING = "Watching only: open the link that haploop view printed to stee
 const REASONS = {
   lost: "No connection to haploop view; trying again.",
   waiting: "Waiting for a run: start one with haploop run SCENE.",
-  ended: "The run has ended; the next one will come up here by itself.",
+  ended: "The run has ended.",
   failed: "The run has failed.",
 };
 
 /** Why nothing can be steered now; "" when it can. */
 export const obstacle = (phase) => REASONS[phase] ?? (maySteer() ? "" : WATCHING);
 
-/** Enable or disable all that steers, and say why. */
-export function allow(phase, why) {
+/** Enable or disable all that steers, and say why; whether the page stays with a run that has ended. */
+export function allow(phase, why, stays = false) {
   const reason = obstacle(phase);
   for (const fieldset of document.querySelectorAll("fieldset[data-steers]")) fieldset.disabled = reason !== "";
-  const told = phase === "waiting" ? "" : reason; // the middle of the page says it there
+  const told = { waiting: "", ended: stays ? reason : `${reason} The next one will come up here by itself.` }[phase] ?? reason; // the middle of the page says that it waits
   put(byId("notice"), [told, why && why[0].toUpperCase() + why.slice(1).replace(/[^.]$/, "$&.")].filter(Boolean).join(" "));
 }
 
@@ -38,10 +38,10 @@ export class Steering {
 }
 
 /** Tell what came of an order. */
-export function say({ ok, text }) {
+export function say({ ok, text, what = "Refused" }) {
   const said = byId("said");
   said.dataset.ok = String(ok);
   said.setAttribute("role", ok ? "status" : "alert");
   // There is a button for what a terminal is told to do to go back.
-  put(said, ok ? text.replace(/; to go back: .*$/, "") : `Refused: ${text}`);
+  put(said, ok ? text.replace(/; to go back: .*$/, "") : `${what}: ${text}`);
 }

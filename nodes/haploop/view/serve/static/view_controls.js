@@ -9,6 +9,7 @@ export class ViewControls {
   /** @param {import("./viewport.js").Viewport} viewport what they change. */
   constructor(viewport) {
     this.viewport = viewport;
+    this.isOver = false;
     for (const radio of document.getElementsByName("span")) {
       radio.addEventListener("change", () => viewport.show(radio.value === ALL ? null : Number(radio.value)));
     }
@@ -17,14 +18,15 @@ export class ViewControls {
     byId("later").addEventListener("click", () => viewport.shift(PART));
   }
 
-  /** Show how it is looked now. */
-  update() {
+  /** Show how it is looked now; a run that is over has no more to come. */
+  update(isOver = this.isOver) {
+    this.isOver = isOver;
     const { span_s: span, frozen } = this.viewport;
     for (const radio of document.getElementsByName("span")) {
       radio.checked = radio.value === (span === null ? ALL : String(span));
     }
     byId("freeze").setAttribute("aria-pressed", String(frozen));
-    put(byId("freeze"), frozen ? "Go live" : "Freeze");
+    put(byId("freeze"), !frozen ? "Freeze" : isOver ? "To its end" : "Go live");
     byId("earlier").disabled = span === null;
     byId("later").disabled = !frozen;
   }
