@@ -31,7 +31,7 @@ def test_a_run_that_never_began_is_told_and_before_the_first_tick_no_loop_is_den
     stand_in.state(tick=0)
     stand_in.show(snapshot(0.0, 2.0))
     expect(page.locator("#no-ticks")).to_be_visible()
-    assert page.locator("#loop .absent").evaluate("e => getComputedStyle(e).visibility") == "hidden"
+    assert page.locator("#loop").evaluate("e => getComputedStyle(e).visibility") == "hidden"
     stand_in.show(contact())
     expect(page.locator("#no-ticks")).to_be_hidden()
     assert page.locator("#energy .plot").evaluate("e => getComputedStyle(e).visibility") == "visible"

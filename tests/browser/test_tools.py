@@ -1,14 +1,32 @@
 """Tools of the page: panels beside the charts, cursors that measure, files that are saved, runs to choose, sliders."""
 
+import base64
 import json
 import re
 
 import pytest
 from playwright.sync_api import expect
 
-from helpers.live.browser import IN_BOTH, order
+from helpers.live.browser import IN_BOTH, RGB, order
 from helpers.live.stand_in import OPTIONS, RUNNING, RUNS
 from oracles.snapshots import contact, snapshot, table
+
+# Whether a colour stands in the rows of names of a saved picture: in none of the rows that a chart's canvas takes.
+SAVED_HEAD = """async ([source, colour]) => {
+    const image = await createImageBitmap(new Blob([Uint8Array.from(atob(source), c => c.charCodeAt(0))]));
+    const canvas = new OffscreenCanvas(image.width, image.height), draw = canvas.getContext("2d");
+    draw.drawImage(image, 0, 0);
+    const shown = [...document.querySelectorAll(".chart canvas")].filter(c => c.getClientRects().length);
+    const heights = shown.map(c => c.height);
+    const rows = [[0, 56]];
+    for (let i = 0, y = 56; i < heights.length; y += 18 + heights[i++] + 10) rows.push([y, 18]);
+    return rows.some(([top, high]) => {
+        const { data } = draw.getImageData(0, top, image.width, high);
+        for (let i = 0; i < data.length; i += 4)
+            if (Math.hypot(...[0, 1, 2].map(c => data[i + c] - colour[c])) < 12) return true;
+        return false;
+    });
+}"""
 
 pytestmark = pytest.mark.slow
 ROWS = [("hand", -2e-3), ("delay", -1e-3), ("damping", 2.5e-3), ("put into store", 5e-4)]
@@ -93,6 +111,15 @@ def test_picture_and_numbers_are_saved_as_files(stand_in, page, tmp_path):
     saving.value.save_as(picture)
     assert picture.read_bytes()[:4] == b"\x89PNG"
     assert picture.stat().st_size > 20_000, "charts are in it"
+    source = base64.b64encode(picture.read_bytes()).decode()
+    for name in ("wall", "element-0", "element-1"):
+        assert page.evaluate(SAVED_HEAD, [source, page.evaluate(RGB, name)[:3]]), (
+            f"{name} has its colour above the charts"
+        )
+    tone = page.evaluate(
+        "getComputedStyle(document.querySelector('#verdict')).borderTopColor.match(/\\d+/g).map(Number)"
+    )
+    assert page.evaluate(SAVED_HEAD, [source, tone]), "the verdict is on it"
     with page.expect_download() as saving:
         page.click("#save-data")
     saving.value.save_as(tmp_path / "data.csv")

@@ -85,6 +85,7 @@ class Viewer:
             session = await self._join(run)
             if session is None:
                 self.why = f'Run {run.id}, "{run.title}", ended before its first tick; its terminal says why.'
+                self._stays = False  # there is nothing to stay with
                 continue
             self.session = self._followed = session
             tasks = [asyncio.create_task(session.clock.keep_asking())]
