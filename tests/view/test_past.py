@@ -3,6 +3,7 @@
 import asyncio
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.receive.past_session import PastSession
 from haploop.view.receive.runs import CommandFailed
 from haploop.view.viewer import Viewer
-from helpers.live.browsing import decode, to_its_end
+from helpers.live.browsing import NoRuns, decode, to_its_end
 
 
 @pytest.fixture
@@ -91,7 +92,8 @@ def test_a_run_that_has_ended_is_listed_once_as_the_recorded_one_that_it_is(reco
         viewer = Viewer(LiveRuns(), None, from_start=True)
         viewer.listing()
         session = PastSession(LiveRuns().past()[0])
-        session.run = SimpleNamespace(id="f1cd5e", title="second run")  # as it was followed
+        followed: Any = SimpleNamespace(id="f1cd5e", title="second run")
+        session.run = followed
         viewer.session = viewer._followed = session
         assert viewer.listing()["shown"] == "second"
         await viewer.open("first")
@@ -101,17 +103,15 @@ def test_a_run_that_has_ended_is_listed_once_as_the_recorded_one_that_it_is(reco
     to_its_end(play())
 
 
-class Live:
+class Live(NoRuns):
     """Live runs that come and go as a test wants."""
 
-    def __init__(self, *names):
+    def __init__(self, *names: str) -> None:
+        super().__init__()
         self.names = [*names]
 
-    def live(self):
+    def live(self) -> list[Any]:
         return [SimpleNamespace(id=name, title=f"run {name}") for name in self.names]
-
-    def past(self):
-        return []
 
 
 def test_a_page_that_stays_with_its_run_takes_up_another_only_where_it_is_chosen():
