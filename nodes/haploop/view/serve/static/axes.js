@@ -24,8 +24,12 @@ const common = () => ({
 
 const numbers = (u, splits, axis, space, step) => axisNumbers(splits, step);
 
+// Where a chart is low its numbers stand closer, so that there are some.
+const [LOW_PX, CLOSE_PX, APART_PX] = [130, 18, 24];
+const numberSpace = (u, axis, low, high, size_px) => (size_px < LOW_PX ? CLOSE_PX : APART_PX);
+
 /** The axis to the left. */
-export const leftAxis = (label) => ({ ...common(), scale: "y", label, size: LEFT_PX, space: 18, values: numbers });
+export const leftAxis = (label) => ({ ...common(), scale: "y", label, size: LEFT_PX, space: numberSpace, values: numbers });
 
 /** The axis below; `space` px at least lie between its numbers, and more where they are long. */
 export const bottomAxis = (label, space = 56) => ({

@@ -98,6 +98,7 @@ function showState() {
     setForm.update(state.options, state);
   }
   allow(phase(), state.why, runs.listing?.stays);
+  if (snapshot) scrubber.show(snapshot, marks); // the last tick comes after the last picture
   view.update(!["running", "paused"].includes(phase()));
 }
 

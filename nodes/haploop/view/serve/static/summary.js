@@ -49,7 +49,7 @@ function figures({ duration_s, ended, extremes = {}, window = {}, real_time_fact
     ran: `${isNumber(duration_s) ? fixed(duration_s, 4) : NONE} s, ${HOW[ended] ?? ended}`,
     "position from": amounts(extremes.x_min_m, extremes.x_max_m, "m"),
     // That of the run itself: noise and the hand, which the pushed copies have not, are in it.
-    ...(isNumber(window.force_ripple_N) ? { "its own force ripples": `${amount(window.force_ripple_N, "N")} above 30 Hz` } : {}),
+    ...(isNumber(window.force_ripple_N) ? { "its own ripple": `${amount(window.force_ripple_N, "N")} above 30 Hz` } : {}),
     "largest force": amount(extremes.force_max_N, "N"),
     "real time": isNumber(factor) ? `${fixed(factor)}×${wasPaused ? ", its pauses in it" : ""}` : NONE,
     "commands lost, dropped": `${lost.commands_lost ?? 0}, ${lost.commands_dropped ?? 0}`,
