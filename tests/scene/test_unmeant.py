@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 import haploop.logger
-from haploop.launch.plan.meant import RULES, note_unmeant
+from haploop.launch.plan.meant.notes import RULES, note_unmeant
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load, places
 from haploop.launch.scene.mistakes import SceneError

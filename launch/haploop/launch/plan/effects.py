@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from haploop.controller.estimators.choose import estimator_class, estimators_for
 from haploop.launch.plan import rules
 from haploop.launch.plan.effect import CHAIN, COUNTED, HISTORY, LINE, LINEAR_RATES, NOISY, RUBBING, Effect
-from haploop.launch.plan.meant import Note, note_unmeant
+from haploop.launch.plan.meant.notes import note_unmeant
+from haploop.launch.plan.meant.rule import Note
 from haploop.plant.integrators.registry import find_integrator, integrator_module, integrator_names
 from haploop.protocol.installed import entry_points_of
 from haploop.protocol.scene.effects import Accelerometer

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from haploop.controller.dissipation import Element
-    from haploop.launch.plan.meant import Note
+    from haploop.launch.plan.meant.rule import Note
     from haploop.protocol.scene.scene import Scene
 
 # More samples of a recorded force than this are not printed to a terminal.

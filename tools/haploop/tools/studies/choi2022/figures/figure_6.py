@@ -112,7 +112,7 @@ def scene_text(work: Work, interpretation: Point, panel: str) -> str:
     lines = [
         work.tell("about_scene", title=title).rstrip(),
         f"title = {inline(title)}",
-        f'extends = "../fig6{panel}.toml"',
+        f'extends = "scenes/fig6{panel}.toml"',
         f"duration = {inline(scene.duration)}",
         f"seed = {inline(scene.seed)}",
         "",
