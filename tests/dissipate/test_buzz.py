@@ -93,6 +93,15 @@ def test_a_buzz_whose_frequency_moves_is_told_from_its_least_to_its_greatest(tmp
     assert "give or take" not in said
 
 
+@pytest.mark.parametrize(
+    ("width", "words"),
+    [(S > 1.0, "stayed as wide"), (np.exp(0.4 * S), "It grew from"), (np.exp(-0.4 * S), "It died down from")],
+)
+def test_a_buzz_is_told_to_grow_to_die_down_or_to_stay(tmp_path: Path, width: Floats, words: str) -> None:
+    path = write(tmp_path / "course.csv", {"t": S, "x": counted(swing(31.0, 2.6e-4) * width)})
+    assert words in shown(make_report(outcome(path)), 400)
+
+
 def test_the_frequency_is_that_of_the_times_where_they_jitter() -> None:
     t = np.sort(1.01 * S + np.random.default_rng(2).uniform(-1e-4, 1e-4, len(S)))
     buzz = finder(2e-4 * np.sin(2.0 * np.pi * 300.0 * t), t).buzz()

@@ -28,6 +28,11 @@ _OVERTONE, _APART_HZ, _CLOSE_HZ = 3.5, 0.3, 2.5
 # Samples a second below which noise has too few lines for one to stand out.
 LEAST_RATE_HZ = 200.0
 
+# The first window that a swing fills which began within the first, by number.
+_FULL = 3
+# A force gives to the swing, or takes, from so much on of what it would at most.
+LEAST_FED = 0.01
+
 Word = Literal["buzzes", "none seen", "cannot say"]
 
 
@@ -40,6 +45,9 @@ class Buzz:
         least_Hz, most_Hz: of the windows.
         stretches: (from, to) of each, half a second at most too early or late, s.
         width_m: of the widest window, peak to peak.
+        first_m, last_m: widths half a second after it began, and of the last window.
+        fed_W: mean power that a recorded force gave to the swing; negative where it took; None where none was recorded.
+        moved_W: mean of what it would be were force and velocity in phase.
     """
 
     frequency_Hz: float
@@ -48,10 +56,24 @@ class Buzz:
     most_Hz: float
     stretches: tuple[tuple[float, float], ...]
     width_m: float
+    first_m: float
+    last_m: float
+    fed_W: float | None = None
+    moved_W: float = 0.0
 
     @property
     def lasts_s(self) -> float:
         return sum(to_s - from_s for from_s, to_s in self.stretches)
+
+    @property
+    def fed_J(self) -> float | None:
+        """Returns what the force gave to the swing while it lasted; None where none was recorded."""
+        return None if self.fed_W is None else self.fed_W * self.lasts_s
+
+    @property
+    def is_fed(self) -> bool:
+        """Tells whether the force gave more to the swing than what may be rounding and noise."""
+        return self.fed_W is not None and self.fed_W > LEAST_FED * self.moved_W
 
 
 class _Window(NamedTuple):
@@ -60,20 +82,25 @@ class _Window(NamedTuple):
     from_s: float
     to_s: float
     line: Line
+    fed: tuple[float, float] | None
 
 
 class BuzzFinder:
     """Looks for a buzz in windows of half a second, in bounded memory but for a row a window.
+
+    Args:
+        delay_s: from a sample to its force, where one is recorded.
 
     Attributes:
         longest_s: the longest part without a gap.
         slow: the widest line slower than ``ABOVE_HZ``; None of a motion without one.
     """
 
-    def __init__(self, period_s: float) -> None:
+    def __init__(self, period_s: float, delay_s: float = 0.0) -> None:
+        self._delay_s = delay_s
         self._size = max(4, round(_WINDOW_S / period_s))
         self.rate_Hz = 1.0 / period_s
-        self._t_s = self._x_m = np.empty(0)
+        self._t_s, self._motion = np.empty(0), np.empty((3, 0))
         self._begins_s = self.longest_s = 0.0
         self.slow: Line | None = None
         # Windows that swing, in stretches without one that does not or has another frequency.
@@ -82,22 +109,26 @@ class BuzzFinder:
     def add(self, piece: Samples) -> None:
         """Takes a piece; its times tell a rate that its period is only about."""
         if piece.begins:
-            self._t_s = self._x_m = np.empty(0)
+            self._t_s, self._motion = np.empty(0), np.empty((3, 0))
             self._begins_s = float(piece.t_s[0])
             self._stretches.append([])
         line = main_line(piece.x_m, self.rate_Hz)
         if line and line.frequency_Hz < ABOVE_HZ and (self.slow is None or line.width > self.slow.width):
             self.slow = line
-        self._t_s, self._x_m = np.append(self._t_s, piece.t_s), np.append(self._x_m, piece.x_m)
+        force = piece.force_N if piece.held_N is None else piece.held_N
+        delay_s = self._delay_s if piece.held_N is None else 0.0
+        rows = piece.x_m, piece.true_x_m, np.full(len(piece.x_m), np.nan) if force is None else force
+        self._t_s, self._motion = np.append(self._t_s, piece.t_s), np.hstack([self._motion, rows])
         self.longest_s = max(self.longest_s, float(self._t_s[-1]) - self._begins_s)
-        while len(self._x_m) >= self._size:
-            self._look(self._t_s[: self._size], self._x_m[: self._size])
+        while len(self._t_s) >= self._size:
+            self._look(self._t_s[: self._size], *self._motion[:, : self._size], delay_s)
             hop = self._size // 4
-            self._t_s, self._x_m = self._t_s[hop:], self._x_m[hop:]
+            self._t_s, self._motion = self._t_s[hop:], self._motion[:, hop:]
 
-    def _look(self, t_s: Floats, x_m: Floats) -> None:
+    def _look(self, t_s: Floats, x_m: Floats, true_x_m: Floats, force_N: Floats, delay_s: float) -> None:
         from_s, to_s = float(t_s[0]), float(t_s[-1])
-        line = swing(x_m, (len(t_s) - 1) / (to_s - from_s))
+        rate_Hz = (len(t_s) - 1) / (to_s - from_s)
+        line = swing(x_m, rate_Hz)
         last = self._stretches[-1]
         if last and not (line and abs(line.frequency_Hz - last[-1].line.frequency_Hz) < _RESOLVED_HZ):
             last = []
@@ -105,7 +136,8 @@ class BuzzFinder:
         if line:
             # What begins within a window begins in its middle, give or take half of it.
             begins_s = from_s if from_s == self._begins_s else (from_s + to_s) / 2.0
-            last.append(_Window(begins_s, to_s, line))
+            fed = None if np.isnan(force_N).any() else fed_W(true_x_m, force_N, rate_Hz, line, delay_s)
+            last.append(_Window(begins_s, to_s, line, fed))
 
     def buzz(self) -> Buzz | None:
         """Returns the buzz; None where there was none, or nothing can be said.
@@ -124,13 +156,20 @@ class BuzzFinder:
             return is_near and window.line.width >= _KEPT * width_m
 
         shorter = [window for stretch in self._stretches for window in stretch if is_alike(window)]
+        told = sorted({*kept, *shorter}, key=lambda window: window.to_s)
+        fed = [window.fed for window in told if window.fed is not None]
+        fed_W, moved_W = np.mean(fed, axis=0).tolist() if fed else (None, 0.0)
         return Buzz(
             float(np.median(swings_Hz)),
             0.5 * _RESOLVED_HZ,
             least_Hz,
             most_Hz,
-            _joined([(window.from_s, window.to_s) for window in kept + shorter]),
+            _joined([(window.from_s, window.to_s) for window in told]),
             width_m,
+            told[min(_FULL, len(told) - 1)].line.width,
+            told[-1].line.width,
+            fed_W,
+            moved_W,
         )
 
     def _lasting(self, stretch: list[_Window]) -> list[_Window]:
@@ -150,6 +189,23 @@ class BuzzFinder:
         if self.buzz():
             return "buzzes"
         return "none seen" if self.longest_s >= LASTS_S - 1e-9 and self.rate_Hz >= LEAST_RATE_HZ else "cannot say"
+
+
+def fed_W(x_m: Floats, force_N: Floats, rate_Hz: float, line: Line, delay_s: float) -> tuple[float, float]:
+    """Returns the mean power that a force gives to a swing, and the most that it could, were it in phase with velocity.
+
+    Each force is held for a period T from its delay d on: it gives F[k] (x(t[k] + d + T) - x(t[k] + d)), of which the
+    mean is Re(conj(F) X exp(i w d) (exp(i w T) - 1)) / T, summed over the lines of the swing. A slower press has no
+    part in it, nor what it stores; nor has the rounding of the positions, but for its share in these lines.
+    """
+    count, window = len(x_m), np.hanning(len(x_m) + 1)[:-1]
+    t = np.linspace(-1.0, 1.0, count)
+    x, force = (np.fft.rfft(window * (u - np.polyval(np.polyfit(t, u, 1), t))) for u in (x_m, force_N))
+    near = np.abs(np.fft.rfftfreq(count, 1.0 / rate_Hz) - line.frequency_Hz) < 2.5 * rate_Hz / count
+    turn = 2j * np.pi * line.frequency_Hz
+    way = x[near] * np.exp(turn * delay_s) * (np.exp(turn / rate_Hz) - 1.0)
+    scale = 2.0 * rate_Hz / (count * float((window**2).sum()))
+    return scale * float((force[near].conj() * way).real.sum()), scale * float(np.abs(force[near] * way).sum())
 
 
 def _is_overtone(frequency_Hz: float, width_m: float, of: Line, apart_Hz: float = _APART_HZ) -> bool:

@@ -125,7 +125,7 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
     booking, noisier = Booking(*makings), Booking(*makings)
     # Of positions alone: what is recorded beside them does not come of their noise.
     noise = PositionNoise() if isinstance(recording, TextRecording) and not recording.recorded else None
-    found = BuzzFinder(recording.period_s)
+    found = BuzzFinder(recording.period_s, recording.delay_s)
     trace = Trace(recording.period_s, 2 + 2 * len(scene.dissipation) + 3 * recording.has_force)
     end_x_m, shown = None, console(stderr=True)
     with shown.status(f"reading {request.path.name}") if shown.is_terminal else nullcontext() as line:

@@ -8,7 +8,7 @@ import numpy as np
 
 from haploop.tools.dissipate.samples import Floats, Samples
 
-Passivity = Literal["passive", "generated", "other sign", "unresolved", "begins loaded"]
+Passivity = Literal["passive", "fed the buzz", "generated", "other sign", "unresolved", "begins loaded"]
 # The terms of a sum that cancel leave so much of them.
 _ROUNDING = 1e-12
 # A wall takes energy before it gives any; of a force that took less than this share of what it gave, ask for the sign.

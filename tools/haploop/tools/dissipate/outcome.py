@@ -192,7 +192,7 @@ class Outcome:
             "recorded": sorted(recording.recorded),
             "noise_m": self.noise_m,
             "buzz_word": self.buzz_word,
-            "buzz": self.buzz and asdict(self.buzz),
+            "buzz": self.buzz and asdict(self.buzz) | {"fed_J": self.buzz.fed_J},
             "main_Hz": self.main_Hz,
             "samples": notes.pop("rows"),
             **notes,
@@ -231,13 +231,16 @@ def make_outcome(
         )
         for table, row, again in zip(scene.dissipation, books, noisier_J, strict=False)
     ]
-    force = None
+    force, buzz = None, found.buzz()
     if of := booking.force:
         own = ElementOutcome("recorded-force", {}, "recorded force", *books[-1])
         # The sign of a force in a log is known.
         is_signed = of.passivity == "other sign" and isinstance(recording, LogRecording)
-        force = ForceOutcome(own, of.naive_J, "generated" if is_signed else of.passivity, of.excess_J)
-    return Outcome(recording, elements, trace, scene, force, noise_m, found.word(), found.buzz(), found.slow)
+        word: Passivity = "generated" if is_signed else of.passivity
+        # What the contact stored before hides what the force gives to a buzz.
+        word = "fed the buzz" if word == "passive" and buzz and buzz.is_fed else word
+        force = ForceOutcome(own, of.naive_J, word, of.excess_J)
+    return Outcome(recording, elements, trace, scene, force, noise_m, found.word(), buzz, found.slow)
 
 
 def _label(table: ElementTable, declared: Mapping[str, tuple[Quantity, object]]) -> str:

@@ -15,6 +15,10 @@ from haploop.tools.render.units import amount, fixed
 
 _PASSIVITY: dict[Passivity, str] = {
     "passive": "it never gave out more than it had taken: passive on this recording",
+    "fed the buzz": (
+        "it never gave out more than it had taken, but it fed the buzz, out of what the contact had stored: passive on "
+        "this recording as a whole, not over the buzz"
+    ),
     "generated": "it gave out up to {excess} more than it had taken: not passive",
     "other sign": (
         "it gave out up to {excess} and took next to nothing before: not passive, or recorded with the other sign "

@@ -35,6 +35,7 @@ class Samples:
         begins: whether a gap lies before it, or it is the first.
         end_x_m: position a period after the last sample; None where it is in the next piece, or not known.
         force_N: recorded force on the device, along the position; None where it was not read.
+        held_N: mean of the force held in the period after each sample, where that is known.
         taken_J: what the force took out of the device in the period after each sample, where that is known exactly.
         unknown: samples at its beginning whose velocity or acceleration would need those in the gap before: no element
             is taken to act there.
@@ -51,6 +52,7 @@ class Samples:
     unknown: int = 0
     force_N: Floats | None = None
     taken_J: Floats | None = None
+    held_N: Floats | None = None
 
 
 @dataclass
@@ -146,7 +148,7 @@ class LogRecording:
                 a = rows["a"] if "acceleration" in self.recorded or self._readings else None
                 end = float(rows["end"][-1]) if "end" in rows else None
                 true, between = rows.get("true", rows["x"]), rows.get("between")
-                force = {"force_N": rows["total"], "taken_J": rows.get("taken_J")}
+                force = {"force_N": rows["total"], "taken_J": rows.get("taken_J"), "held_N": rows.get("held_N")}
                 yield Samples(rows["timestamp"], rows["x"], v, a, true, between, first, end, **force)
                 first = False
         if self.notes.rows < 2:
@@ -187,5 +189,6 @@ class _Waiting:
             x, force = self._plant[:, : ticks * n + 1]
             steps, work = x[:-1].reshape(ticks, n), (force[:-1] * np.diff(x)).reshape(ticks, n)
             rows |= {"true": steps[:, 0], "between": steps[:, self._late], "end": x[n::n], "taken_J": -work.sum(axis=1)}
+            rows["held_N"] = force[:-1].reshape(ticks, n).mean(axis=1)
             self._plant = self._plant[:, ticks * n :]
         return rows

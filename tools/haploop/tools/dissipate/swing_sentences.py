@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from haploop.tools.dissipate.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, Word
+from haploop.tools.dissipate.buzz import ABOVE_HZ, LASTS_S, LEAST_FED, LEAST_RATE_HZ, Buzz, Word
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.render.units import amount
 
@@ -22,6 +22,15 @@ _BUZZ: dict[Word, str] = {
 }
 _ONE_HZ, _MOVING_HZ = "{0:.1f} Hz (give or take {1:g} Hz)", "{0:.0f} to {1:.0f} Hz"
 _ONCE, _AGAIN = "from about {0:.1f} s to {1:.1f} s", "{0} times between about {1:.1f} s and {2:.1f} s, {3:.1f} s in all"
+_GREW, _DIED, _STAYED = " It grew from {0} to {1}.", " It died down from {0} to {1}.", " It stayed as wide."
+# It grew, or died down, by so much.
+_TELLS = 1.2
+_FED = " Meanwhile the recorded force gave {energy} to this swing, {power}: it feeds it."
+_TAKEN = (
+    " Meanwhile the recorded force took {energy} out of this swing, {power}: something else feeds it, unless the force "
+    "came later than was said (--delay)."
+)
+_NEITHER = " The recorded force neither fed this swing nor took from it, but for a hundredth of what went to and fro."
 _SLOWER = " It swings at {main:.3g} Hz, {width} peak to peak at most, which a hand can, too."
 NEXT = (
     "Which wall and which element suit the device: describe it in a file (haploop scenes premium15 prints one to start "
@@ -56,8 +65,23 @@ def buzz_sentence(outcome: Outcome) -> str:
         limits["when"] = _ONCE.format(from_s, to_s) if times == 1 else _AGAIN.format(times, from_s, to_s, buzz.lasts_s)
     words = _BUZZ[outcome.buzz_word].format(**limits)
     if outcome.buzz or not outcome.slow:
-        return words
+        return words + _course(outcome.buzz) + _fed(outcome.buzz)
     return words + _SLOWER.format(main=outcome.slow.frequency_Hz, width=amount(outcome.slow.width, "m"))
+
+
+def _course(buzz: Buzz | None) -> str:
+    """Returns whether a buzz of one stretch grows; what began within a window is as wide as it is half a second on."""
+    if not buzz or len(buzz.stretches) > 1:
+        return ""
+    words = _GREW if buzz.last_m > _TELLS * buzz.first_m else _DIED if buzz.first_m > _TELLS * buzz.last_m else _STAYED
+    return words.format(amount(buzz.first_m, "m"), amount(buzz.last_m, "m"))
+
+
+def _fed(buzz: Buzz | None) -> str:
+    if not buzz or buzz.fed_W is None or buzz.fed_J is None:
+        return ""
+    words = _FED if buzz.is_fed else _TAKEN if -buzz.fed_W > LEAST_FED * buzz.moved_W else _NEITHER
+    return words.format(energy=amount(abs(buzz.fed_J), "J"), power=amount(abs(buzz.fed_W), "W"))
 
 
 def filtered_out(outcome: Outcome) -> list[str]:
