@@ -121,7 +121,8 @@ class BuzzFinder:
         self._t_s, self._motion = np.append(self._t_s, piece.t_s), np.hstack([self._motion, rows])
         self.longest_s = max(self.longest_s, float(self._t_s[-1]) - self._begins_s)
         while len(self._t_s) >= self._size:
-            self._look(self._t_s[: self._size], *self._motion[:, : self._size], delay_s)
+            x_m, true_x_m, force_N = self._motion[:, : self._size]
+            self._look(self._t_s[: self._size], x_m, true_x_m, force_N, delay_s)
             hop = self._size // 4
             self._t_s, self._motion = self._t_s[hop:], self._motion[:, hop:]
 

@@ -78,7 +78,7 @@ def make_report(outcome: Outcome) -> RenderableType:
     for element in rows(outcome):
         table.add_row(*make_row(element))
     head = Text(f"{outcome.recording.name}: {conclusion(outcome)}", style="bold")
-    first = [*outcome.recording.notes.remarks, *filtered_out(outcome)]
+    first = doubtful(outcome)
     doubts = [Text(sentence, style="bold yellow") for sentence in first]
     buzz = Text(buzz_sentence(outcome), style="bold" if outcome.buzz else "")
     said = [sentence for sentence in note_sentences(outcome) if sentence not in first] + [NEXT] * bool(outcome.buzz)
@@ -137,6 +137,11 @@ def _times(best: ElementOutcome, other: ElementOutcome) -> str:
     return "as much as" if ratio < 1.005 else f"{fixed(ratio)} times as much as" if ratio < 1e4 else "far more than"
 
 
+_ROUNDED = "The times are rounded to {step}: even samples at {rate:.6g} Hz fit them, and are taken."
+_MAY_BE_WRONG = (
+    "Energies and rate may be wrong: {percent:.0f} % of the periods are more than a tenth off the others, and all are "
+    "taken for equal. Where the samples were even, give their rate (--rate)."
+)
 _SIZES = "Each element is tried at the size given here alone; at another it takes another amount."
 _IN_CONTACT = "Elements act in contact with the wall only; one with acts=always would everywhere."
 
@@ -148,6 +153,7 @@ def note_sentences(outcome: Outcome) -> list[str]:
     estimated = [name for name in ("velocity", "acceleration") if name not in recording.recorded]
     sentences = [
         f"{notes.rows} samples at {1.0 / recording.period_s:.6g} Hz, {from_s:g} to {to_s:g} s.",
+        _ROUNDED.format(step=amount(notes.rounded_s, "s"), rate=1.0 / recording.period_s) if notes.rounded_s else "",
         (f"Taken as recorded: {taken}. " if taken else "") + _estimates(outcome.scene, estimated),
         _truth(outcome) if rows(outcome) else "",
         _SIZES if len(outcome.elements) > 1 else "",
@@ -164,7 +170,14 @@ def note_sentences(outcome: Outcome) -> list[str]:
         if count := getattr(notes, name):
             percent, missing = 100.0 * count / notes.rows, amount(notes.missing_s, "s")
             sentences.append(sentence.format(count=count, percent=percent, missing=missing))
-    return [sentence for sentence in [*sentences, *notes.remarks, *filtered_out(outcome)] if sentence]
+    return [sentence for sentence in [*sentences, *doubtful(outcome)] if sentence]
+
+
+def doubtful(outcome: Outcome) -> list[str]:
+    """Returns what stands before the answer: that it may be wrong, and why."""
+    notes = outcome.recording.notes
+    uneven = _MAY_BE_WRONG.format(percent=100.0 * notes.uneven / notes.rows)
+    return [*[uneven] * notes.is_uneven, *notes.remarks, *filtered_out(outcome)]
 
 
 def _noise(outcome: Outcome) -> list[str]:

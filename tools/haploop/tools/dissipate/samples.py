@@ -17,6 +17,8 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase, TimebaseError
 
 Floats = NDArray[np.float64]
+# Share of the periods from which on uneven ones are told before anything else.
+UNEVEN_SHARE = 0.01
 
 
 class RecordingError(ValueError):
@@ -63,7 +65,8 @@ class Notes:
         gaps_s: begin and end of each gap, s; the first hundred.
         bridged: single samples that were missing and are the mean of their neighbours.
         repeated: samples equal to the one before although the device moved, by three counts or more, before and after.
-        uneven: periods that are more than a tenth off the others.
+        uneven: periods that are more than a tenth off the others, or than rounding makes them.
+        rounded_s: the step to which times are rounded that are even but for that, s; 0 where nothing of it is seen.
     """
 
     rows: int = 0
@@ -74,6 +77,13 @@ class Notes:
     bridged: int = 0
     repeated: int = 0
     uneven: int = 0
+    rounded_s: float = 0.0
+
+    @property
+    def is_uneven(self) -> bool:
+        """Tells whether so many periods are uneven that energies may be wrong."""
+        return self.uneven > UNEVEN_SHARE * self.rows
+
     remarks: list[str] = field(default_factory=list)
 
     def gap(self, from_s: float, to_s: float) -> None:

@@ -13,6 +13,7 @@ from haploop.launch.scene.number import scale_of
 from haploop.tools.dissipate.delimited import Column, DelimitedFile
 from haploop.tools.dissipate.plausible import Largest
 from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
+from haploop.tools.dissipate.stamps import Stamps, stamps
 
 # Names of columns that are looked for where none is given.
 _TIMES = ("t", "time", "timestamp", "time_s", "t_s", "seconds")
@@ -64,7 +65,8 @@ class Layout:
 class TextRecording:
     """Reads samples from a text file, a control period apart; between them the device moves in straight lines.
 
-    The period is the median of those at the beginning, or that of the rate. The times are otherwise used only where
+    The period is the median of those at the beginning, that of an even grid where the times are one, rounded, or that
+    of the rate. The times are otherwise used only where
     samples are missing: a controller that counts its ticks takes no notice of how late each of them is.
     """
 
@@ -83,7 +85,8 @@ class TextRecording:
         if not self.has_force and (unread := file.find(_FORCES)):
             self.notes.remarks.append(f"Column {unread.name} was not read: --force {unread.name} books its work.")
         self.recorded = frozenset(name for name in ("velocity", "acceleration") if name in self._columns)
-        self.period_s = 1.0 / layout.rate_Hz if layout.rate_Hz else self._median_period(layout.time_unit)
+        of = Stamps(1.0 / layout.rate_Hz) if layout.rate_Hz else self._stamps(layout.time_unit)
+        self.period_s, self.notes.rounded_s = of.period_s, of.rounded_s
         # The velocity needs one sample before, the acceleration two; what was recorded needs none.
         self._unknown = 2 - len(self.recorded)
         place = self._columns["position"]
@@ -134,7 +137,7 @@ class TextRecording:
             f"Which column of {file.path} is the {what}? Name it with --{what}{instead}. There are: {there}."
         )
 
-    def _median_period(self, unit: str | None) -> float:
+    def _stamps(self, unit: str | None) -> Stamps:
         block = next(self._rows(), None)
         if block is None or len(block[0]["time"]) < 2:
             raise RecordingError(f"{self._file.path} holds fewer than two samples.")
@@ -156,7 +159,16 @@ class TextRecording:
             raise RecordingError(
                 f"The samples are {period_s:g} s apart; is the unit of the time right? Give --time-unit."
             )
-        return period_s
+        return stamps(times, self._scales["time"])
+
+    @property
+    def _longest_s(self) -> float:
+        """The longest step without a gap; rounding alone makes one as much longer as it rounds to."""
+        return max(_GAP * self.period_s, self.period_s + self.notes.rounded_s * (1.0 + _UNEVEN))
+
+    @property
+    def _uneven_s(self) -> float:
+        return _UNEVEN * self.period_s + self.notes.rounded_s
 
     def samples(self) -> Iterator[Samples]:
         """Yields all samples, in pieces without a gap."""
@@ -168,9 +180,9 @@ class TextRecording:
             self._widen(columns["position"])
             steps = np.diff(t, prepend=t[:1] if last_s is None else last_s)
             self._refuse_disorder(t, steps, lines, last_s)
-            is_gap = steps > _GAP * self.period_s
+            is_gap = steps > self._longest_s
             is_gap[0] |= last_s is None
-            self.notes.uneven += int((np.abs(steps[~is_gap] / self.period_s - 1.0) > _UNEVEN).sum())
+            self.notes.uneven += int((np.abs(steps[~is_gap] - self.period_s) > self._uneven_s).sum())
             for at in np.flatnonzero(is_gap):
                 before = t[at - 1] if at else last_s
                 if before is not None:
@@ -224,7 +236,7 @@ class TextRecording:
     def _bridged(self, columns: dict[str, Floats], lines: Floats) -> tuple[dict[str, Floats], Floats]:
         """Returns the rows with the mean of both neighbours where a single one is missing between them."""
         steps = np.diff(columns["time"])
-        at = np.flatnonzero((steps > _GAP * self.period_s) & (steps < _ONE_MISSING * self.period_s)) + 1
+        at = np.flatnonzero((steps > self._longest_s) & (steps < _ONE_MISSING * self.period_s)) + 1
         self.notes.bridged += len(at)
         whole = {
             name: np.insert(column, at, column[at - 1] / 2.0 + column[at] / 2.0) for name, column in columns.items()

@@ -1,0 +1,75 @@
+"""Times that are rounded more coarsely than their samples lie apart, and those that are uneven."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from haploop.tools.dissipate.report import doubtful, make_report, note_sentences
+from haploop.tools.dissipate.samples import Floats
+from haploop.tools.dissipate.text_recording import Layout
+from helpers.data.recordings import outcome, write
+from helpers.shown import shown
+
+
+def motion(t: Floats) -> Floats:
+    return 1e-3 * np.sin(2.0 * np.pi * 7.0 * t)
+
+
+def damped_J(path: Path, layout: Layout | None = None) -> float:
+    return outcome(path, layout=layout or Layout(), dampings=["2"]).elements[0].true_J
+
+
+@pytest.mark.parametrize("rounding", [np.round, np.floor, np.ceil])
+@pytest.mark.parametrize(
+    ("rate_Hz", "step_s", "name"),
+    [
+        (400.0, 1e-3, "t (ms)"),
+        (600.0, 1e-3, "t (s)"),
+        (950.0, 1e-4, "t (s)"),
+        (333.7, 1e-3, "t (us)"),
+        (61.0, 1e-2, "t (s)"),
+    ],
+)
+def test_even_samples_with_rounded_times_keep_their_rate_and_energy(
+    tmp_path: Path, rate_Hz: float, step_s: float, name: str, rounding: Callable[[Floats], Floats]
+) -> None:
+    t = np.arange(1600) / rate_Hz
+    unit = {"t (ms)": 1e3, "t (us)": 1e6}.get(name, 1.0)
+    stamped = np.round(rounding(t / step_s + 1e-9) * step_s * unit, 6)
+    even = damped_J(write(tmp_path / "even.csv", {"x": motion(t)}), Layout(rate_Hz=rate_Hz))
+    path = write(tmp_path / "rounded.csv", {name: stamped, "x (m)": motion(t)})
+    found = outcome(path, dampings=["2"])
+    assert 1.0 / found.recording.period_s == pytest.approx(rate_Hz, rel=1e-4)
+    assert found.elements[0].true_J == pytest.approx(even, rel=1e-4)
+    notes = found.recording.notes
+    assert (notes.uneven, notes.gaps, notes.bridged, notes.rounded_s) == (0, 0, 0, pytest.approx(step_s))
+    assert any("The times are rounded to" in sentence for sentence in note_sentences(found))
+    assert not doubtful(found)
+
+
+def test_a_missing_sample_and_a_gap_are_found_between_rounded_times(tmp_path: Path) -> None:
+    kept = np.r_[0:400, 401:700, 740:1600]
+    t = np.arange(1600)[kept] / 400.0
+    found = outcome(write(tmp_path / "holes.csv", {"t (ms)": np.round(t * 1e3), "x (m)": motion(t)}), dampings=["2"])
+    assert 1.0 / found.recording.period_s == pytest.approx(400.0)
+    notes = found.recording.notes
+    assert (notes.uneven, notes.gaps, notes.bridged) == (0, 1, 1)
+
+
+def test_times_that_are_uneven_are_the_first_thing_said_and_that_energies_may_be_wrong(tmp_path: Path) -> None:
+    jitter = np.random.default_rng(3).uniform(-1e-3, 1e-3, 1600)
+    t = np.round(np.arange(1600) * 2.5e-3 + jitter, 4)
+    found = outcome(write(tmp_path / "jitter.csv", {"t": t, "x": motion(t)}), dampings=["2"])
+    assert found.recording.notes.rounded_s == 0.0
+    assert shown(make_report(found), 400).startswith("Energies and rate may be wrong: ")
+
+
+def test_even_times_are_said_to_be_nothing_else(tmp_path: Path) -> None:
+    t: Floats = np.round(np.arange(1600.0) * 1e-3, 3)
+    found = outcome(write(tmp_path / "even.csv", {"t": t, "x": motion(t)}), dampings=["2"])
+    assert found.recording.period_s == pytest.approx(1e-3, rel=1e-12)
+    assert "rounded" not in shown(make_report(found), 400)
