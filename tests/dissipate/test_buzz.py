@@ -142,6 +142,18 @@ def test_the_overtone_of_a_slower_swing_whose_frequency_changes_is_no_buzz() -> 
     assert finder(1e-3 * np.sin(phase) + 2e-4 * np.sin(2.0 * phase) - 3e-3 * S).word() == "none seen"
 
 
+def test_a_swing_left_out_near_a_multiple_of_a_slower_one_is_told_beside_that_none_was_seen(tmp_path: Path) -> None:
+    path = write(tmp_path / "beside.csv", {"t": S, "x": swing(12.33, 5e-4) + swing(37.0, 1e-4)})
+    found = outcome(path)
+    assert found.buzz is None
+    assert "A swing at 37.0 Hz, 208 µm peak to peak, was left out: near 3 times 12.4 Hz" in shown(
+        make_report(found), 400
+    )
+    assert found.as_data()["left_out"]["frequency_Hz"] == pytest.approx(37.0, abs=0.1)
+    alone = outcome(write(tmp_path / "alone.csv", {"t": S, "x": swing(12.33, 5e-4)}))
+    assert "left out" not in shown(make_report(alone), 400)
+
+
 @pytest.mark.parametrize("period_s", [5e-3, 1e-3, 1e-4])
 def test_noise_is_no_buzz(period_s: float) -> None:
     for seed in range(8):

@@ -76,6 +76,17 @@ class Buzz:
         return self.fed_W is not None and self.fed_W > LEAST_FED * self.moved_W
 
 
+class Overtone(NamedTuple):
+    """A line that was left out, near a multiple of a slower one."""
+
+    line: Line
+    slower_Hz: float
+
+    @property
+    def order(self) -> int:
+        return round(self.line.frequency_Hz / self.slower_Hz)
+
+
 class _Window(NamedTuple):
     """A window that swings."""
 
@@ -105,6 +116,7 @@ class BuzzFinder:
         self.slow: Line | None = None
         # Windows that swing, in stretches without one that does not or has another frequency.
         self._stretches: list[list[_Window]] = [[]]
+        self._left_out: list[Overtone] = []
 
     def add(self, piece: Samples) -> None:
         """Takes a piece; its times tell a rate that its period is only about."""
@@ -130,6 +142,9 @@ class BuzzFinder:
         from_s, to_s = float(t_s[0]), float(t_s[-1])
         rate_Hz = (len(t_s) - 1) / (to_s - from_s)
         line = swing(x_m, rate_Hz)
+        if line and (slower := _overtone_of(line, x_m, rate_Hz)):
+            self._left_out.append(Overtone(line, slower.frequency_Hz))
+            line = None
         last = self._stretches[-1]
         if last and not (line and abs(line.frequency_Hz - last[-1].line.frequency_Hz) < _RESOLVED_HZ):
             last = []
@@ -182,8 +197,14 @@ class BuzzFinder:
         if kept and self.slow:
             frequency_Hz = float(np.median([window.line.frequency_Hz for window in kept]))
             if _is_overtone(frequency_Hz, max(window.line.width for window in kept), self.slow):
+                self._left_out += [Overtone(window.line, self.slow.frequency_Hz) for window in kept]
                 return []
         return kept
+
+    def overtone(self) -> Overtone | None:
+        """Returns the widest line that lasted and was left out for an overtone; None where there was none."""
+        lasted = len(self._left_out) > round(4 * (LASTS_S - _WINDOW_S) / _WINDOW_S)
+        return max(self._left_out, key=lambda each: each.line.width) if lasted else None
 
     def word(self) -> Word:
         """Returns whether the recording buzzes, as far as it can be said."""
@@ -232,11 +253,12 @@ def swing(x_m: Floats, rate_Hz: float) -> Line | None:
     steps = np.abs(np.diff(x_m))
     if line is None or line.share < _SHARE or not is_felt(line.width, line.frequency_Hz):
         return None
-    slower = main_line(x_m, rate_Hz)  # one whose frequency changes is none over more than a window
-    if (
-        slower
-        and slower.frequency_Hz < ABOVE_HZ
-        and _is_overtone(line.frequency_Hz, line.width, slower, 0.3 * _RESOLVED_HZ)
-    ):
-        return None
     return line if line.width > _COUNTS * np.percentile(steps[steps > 0.0], _SMALLEST) else None
+
+
+def _overtone_of(line: Line, x_m: Floats, rate_Hz: float) -> Line | None:
+    """Returns the slower line of a window of which another may be an overtone, also where its frequency changes."""
+    slower = main_line(x_m, rate_Hz)
+    if not slower or slower.frequency_Hz >= ABOVE_HZ:
+        return None
+    return slower if _is_overtone(line.frequency_Hz, line.width, slower, 0.3 * _RESOLVED_HZ) else None

@@ -11,7 +11,7 @@ import numpy as np
 from haploop.controller.dissipation import Element, Quantity
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.dissipate.booking import Booked, Booking
-from haploop.tools.dissipate.buzz import Buzz, BuzzFinder, Word
+from haploop.tools.dissipate.buzz import Buzz, BuzzFinder, Overtone, Word
 from haploop.tools.dissipate.force_book import Passivity
 from haploop.tools.dissipate.samples import Floats, LogRecording
 from haploop.tools.dissipate.text_recording import TextRecording
@@ -147,6 +147,7 @@ class Outcome:
         noise_m: noise of the recorded positions; None where rates were recorded beside them.
         buzz_word, buzz: whether the recording buzzes, and the buzz.
         slow: the widest line of a slower motion; None of one without.
+        left_out: a line that was taken for the shape of a slower motion, where no buzz was seen.
     """
 
     recording: Recording
@@ -158,6 +159,7 @@ class Outcome:
     buzz_word: Word
     buzz: Buzz | None
     slow: Line | None
+    left_out: Overtone | None = None
 
     @property
     def main_Hz(self) -> float | None:
@@ -193,6 +195,7 @@ class Outcome:
             "noise_m": self.noise_m,
             "buzz_word": self.buzz_word,
             "buzz": self.buzz and asdict(self.buzz) | {"fed_J": self.buzz.fed_J},
+            "left_out": self.left_out and self.left_out.line._asdict() | {"slower_Hz": self.left_out.slower_Hz},
             "main_Hz": self.main_Hz,
             "samples": notes.pop("rows"),
             **notes,
@@ -240,7 +243,18 @@ def make_outcome(
         # What the contact stored before hides what the force gives to a buzz.
         word = "fed the buzz" if word == "passive" and buzz and buzz.is_fed else word
         force = ForceOutcome(own, of.naive_J, word, of.excess_J)
-    return Outcome(recording, elements, trace, scene, force, noise_m, found.word(), buzz, found.slow)
+    return Outcome(
+        recording,
+        elements,
+        trace,
+        scene,
+        force,
+        noise_m,
+        found.word(),
+        buzz,
+        found.slow,
+        None if buzz else found.overtone(),
+    )
 
 
 def _label(table: ElementTable, declared: Mapping[str, tuple[Quantity, object]]) -> str:

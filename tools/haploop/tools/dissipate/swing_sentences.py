@@ -12,8 +12,8 @@ _BUZZ: dict[Word, str] = {
     "buzzes": "The recording buzzes: it swings at {frequency}, {width} peak to peak at most, {when}; "
     "pauses of less than half a second are not told.",
     "none seen": (
-        "No buzz was seen: no swing at one frequency above {above:g} Hz lasts {lasts:g} s and is wide enough to be "
-        "felt. Swings at several frequencies at once are not looked for."
+        "No buzz was seen: no{other} swing at one frequency above {above:g} Hz lasts {lasts:g} s and is wide enough to "
+        "be felt. Swings at several frequencies at once are not looked for."
     ),
     "cannot say": (
         "Whether the recording buzzes cannot be said: that takes {lasts:g} s without a gap, and {rate:g} samples a "
@@ -36,6 +36,10 @@ NEXT = (
     "Which wall and which element suit the device: describe it in a file (haploop scenes premium15 prints one to start "
     "from), and run haploop advise FILE."
 )
+_LEFT_OUT = (
+    " A swing at {at:.1f} Hz, {width} peak to peak, was left out: near {order} times {of:.1f} Hz it may be the shape "
+    "of that slower motion, but it may be a buzz."
+)
 _LOW_PASS = (
     "Low-pass the estimates, as by --set acceleration.cutoff={acceleration:.0f} or --set "
     "velocity.cutoff={velocity:.0f}, until the energy no longer depends on it."
@@ -54,7 +58,12 @@ _FILTERED_OUT = (
 
 def buzz_sentence(outcome: Outcome) -> str:
     """Returns whether the recording buzzes: at which frequency, how wide, when."""
-    limits: dict[str, Any] = {"above": ABOVE_HZ, "lasts": LASTS_S, "rate": LEAST_RATE_HZ}
+    limits: dict[str, Any] = {
+        "above": ABOVE_HZ,
+        "lasts": LASTS_S,
+        "rate": LEAST_RATE_HZ,
+        "other": " other" if outcome.left_out else "",
+    }
     if buzz := outcome.buzz:
         moves = buzz.most_Hz - buzz.least_Hz > 2.0 * buzz.within_Hz
         of_Hz = (buzz.least_Hz, buzz.most_Hz) if moves else (buzz.frequency_Hz, buzz.within_Hz)
@@ -64,21 +73,26 @@ def buzz_sentence(outcome: Outcome) -> str:
         times = len(buzz.stretches)
         limits["when"] = _ONCE.format(from_s, to_s) if times == 1 else _AGAIN.format(times, from_s, to_s, buzz.lasts_s)
     words = _BUZZ[outcome.buzz_word].format(**limits)
-    if outcome.buzz or not outcome.slow:
+    if outcome.buzz:
         return words + _course(outcome.buzz) + _fed(outcome.buzz)
-    return words + _SLOWER.format(main=outcome.slow.frequency_Hz, width=amount(outcome.slow.width, "m"))
+    if slow := outcome.slow:
+        words += _SLOWER.format(main=slow.frequency_Hz, width=amount(slow.width, "m"))
+    if not (of := outcome.left_out):
+        return words
+    numbers = {"at": of.line.frequency_Hz, "width": amount(of.line.width, "m"), "order": of.order, "of": of.slower_Hz}
+    return words + _LEFT_OUT.format(**numbers)
 
 
-def _course(buzz: Buzz | None) -> str:
+def _course(buzz: Buzz) -> str:
     """Returns whether a buzz of one stretch grows; what began within a window is as wide as it is half a second on."""
-    if not buzz or len(buzz.stretches) > 1:
+    if len(buzz.stretches) > 1:
         return ""
     words = _GREW if buzz.last_m > _TELLS * buzz.first_m else _DIED if buzz.first_m > _TELLS * buzz.last_m else _STAYED
     return words.format(amount(buzz.first_m, "m"), amount(buzz.last_m, "m"))
 
 
-def _fed(buzz: Buzz | None) -> str:
-    if not buzz or buzz.fed_W is None or buzz.fed_J is None:
+def _fed(buzz: Buzz) -> str:
+    if buzz.fed_W is None or buzz.fed_J is None:
         return ""
     words = _FED if buzz.is_fed else _TAKEN if -buzz.fed_W > LEAST_FED * buzz.moved_W else _NEITHER
     return words.format(energy=amount(abs(buzz.fed_J), "J"), power=amount(abs(buzz.fed_W), "W"))
