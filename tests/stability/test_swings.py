@@ -9,6 +9,8 @@ from haploop.launch.stability.decide import decide
 from haploop.launch.stability.swing import Pushed, Swing, measure
 from haploop.launch.stability.traces import frequency_Hz, is_felt, most_felt, sizes, smallest_felt_m, trend, widths
 from haploop.logger.verdict.ripple import ripple
+from haploop.tools.render.report import finding_table
+from helpers.shown import shown
 
 
 def swing_of(x: np.ndarray, rate: float, command: np.ndarray | None = None) -> Swing:
@@ -100,7 +102,9 @@ def test_a_swing_said_to_last_is_bounded_by_the_one_of_the_two_that_changes_more
     assert finding.most_1_s is not None
     of_the_steadier = abs(finding.rate_1_s) + 2.0 * finding.error_1_s
     assert finding.most_1_s == pytest.approx(of_the_steadier + 0.0009, rel=0.02)
-    assert f"no more than {finding.most_1_s:.2g} 1/s" in finding.sentence()
+    bound = f"that which may change more grows or decays by no more than {finding.most_1_s:.2g} 1/s"
+    assert bound in finding.sentence()
+    assert f"of the steadier swing {finding.rate_1_s:.3g} +- " in shown(finding_table(finding), 200)
 
 
 @pytest.mark.parametrize("rate_1_s", [-0.0045, -0.0033, 0.0033])

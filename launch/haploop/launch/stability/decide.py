@@ -54,8 +54,9 @@ WHY = {
     "at {frequency_Hz:.3g} Hz: less than a hand feels{decaying}.",
     "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width} peak to peak at "
     "{frequency_Hz:.3g} Hz.",
-    "lasts": "Swings of {width} peak to peak at {frequency_Hz:.3g} Hz lasted for {watched_s:g} s, growing "
-    "or decaying by no more than {most_1_s:.2g} 1/s (two standard errors).",
+    "lasts": "After pushes of {push_N:.3g} N and a tenth of it swings of {width} peak to peak at {frequency_Hz:.3g} Hz "
+    "lasted for {watched_s:g} s; that which may change more grows or decays by no more than {most_1_s:.2g} 1/s (two "
+    "standard errors).",
     "decays": "Its swing of {width} peak to peak at {frequency_Hz:.3g} Hz still decays, by {rate_1_s:.3g} +- "
     "{error_1_s:.2g} 1/s, and nothing in the loop makes small swings other than large ones.",
     "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",

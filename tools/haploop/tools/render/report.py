@@ -205,7 +205,7 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
         watched = f"watched for {found['watched_s']:g} s"
         rows += [
             ("its force ripples by", f"{amount(found['force_ripple_N'], 'N')} peak to peak above 30 Hz"),
-            ("growth", f"{found['rate_1_s']:.3g} +- {found['error_1_s']:.2g} 1/s, {watched}"),
+            ("growth", f"of the steadier swing {found['rate_1_s']:.3g} +- {found['error_1_s']:.2g} 1/s, {watched}"),
         ]
     if (share := found.get("own_share")) is not None:
         beside = found.get("moved_beside", ("the hand's motion", "noise"))
