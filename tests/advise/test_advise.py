@@ -154,7 +154,7 @@ def test_what_is_assumed_stands_in_the_answer_with_what_the_wall_would_be_were_i
     limits = [Limit(value, 1.05 * value) for value in (16_000.0, 40_000.0, 30_000.0, right_N_m)]
     right = Best(DAMPING, (12.0,), limits[2], limits[3])
     told: Any = SimpleNamespace(
-        assumed=((Assumed("friction.kinetic", "a guess"), *limits[:2]),), described=limits[2],
+        assumed=((Assumed("friction.kinetic", "a guess"), *limits[:2]),), unchanged=SimpleNamespace(limit=limits[2]),
         found=SimpleNamespace(stiffness_N_m=17_000.0),
     )  # fmt: skip
     found = assumes(told, right)

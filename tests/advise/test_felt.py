@@ -58,3 +58,21 @@ def test_three_micrometres_at_120_hz_are_felt_six_times_over_although_a_count_is
     found = seen(1.5e-6 * np.sin(2 * np.pi * 120.0 * T), stiffness=0.0)
     assert 3.0 < found.times_felt[0] < 12.0
     assert not found.by_force[0]
+
+
+def test_a_swing_has_a_line_and_spikes_a_frequency_apart_from_nothing_have_none():
+    assert seen(1e-4 * np.sin(2 * np.pi * 37.0 * T)).is_line[0]
+    assert seen(-10.4 * 30e-6 + 20e-6 * np.sign(np.sin(2 * np.pi * 26.0 * T)), q=30e-6).is_line[0]
+    x = np.full(len(T), -1e-4)
+    x[[40, 41, 90, 93, 130, 200, 202]] += 25e-6
+    spikes = seen(x, q=25e-6)
+    assert spikes.turns[0] >= TURNS
+    assert spikes.times_felt[0] >= 1.0
+    assert not spikes.is_line[0]
+
+
+def test_what_is_felt_by_force_and_by_motion_is_told_as_both():
+    wide = seen(1e-3 * np.sin(2 * np.pi * 37.0 * T))
+    assert wide.times_felt[0] >= wide.other_felt[0] >= 1.0
+    fine = seen(-10.5 * 28.7e-6 + 0.01e-6 * np.sin(2 * np.pi * 100.0 * T), q=28.7e-6)
+    assert fine.times_felt[0] >= 1.0 > fine.other_felt[0]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 from haploop.launch.stability.judge import judge_scene
+from haploop.launch.stability.looks import LOOKS_S
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.advise.changes import assumed_otherwise, changed_limits, changes, idealised
+from haploop.tools.advise.changes import Borne, assumed_otherwise, changed_limits, changes, idealised
+from haploop.tools.advise.families import Values
 from haploop.tools.advise.known import PUBLISHED, Formula, Published, formulas
 from haploop.tools.advise.search import Found, search
 from haploop.tools.advise.subject import Assumed, Subject
@@ -46,9 +48,11 @@ READING = (
     "more, at holds of 0.3, 1 and 3 times the task's; a dash where an element allows no tenth more than the wall "
     "alone. Attacked: at all holds, sways and approaches, as the first line; a dash where that was not tried, since "
     "another bears more, or nearly as much with fewer elements. * where stiffer walls bear what a softer one does "
-    "not. Changes and assumptions: of the loop as described, with the element advised or with none, whichever bears "
-    "more, at the three holds."
+    "not. Changes and assumptions: as described and in the corners hardest on the wall, at the three holds, with the "
+    "element advised at half to 1.4 of its size, whichever suits the change, or none; and without one. What is assumed "
+    "counts as described; none is attacked."
 )
+UNCHANGED = "as it is"
 SAFE_MEANS = (
     "at rest, or swinging by less than a hand feels, in position (Israr, Choi and Tan 2006) and in force (what would "
     "move device and hand by as much)"
@@ -57,11 +61,24 @@ SAFE_MEANS = (
 
 @dataclass(frozen=True)
 class Changed:
-    """The limit of a changed loop as described, with the element advised, and as a multiple of that without change."""
+    """What a changed loop bears in the hardest corners, and as a multiple of what it does without the change.
+
+    With the element tuned anew, or none, whichever bears more; and ``alone``, without one.
+    """
 
     words: str
     limit: Limit
     factor: float
+    alone: Limit
+    alone_factor: float
+    values: Values = ()
+
+    @classmethod
+    def from_borne(cls, words: str, borne: Borne, base: Borne) -> Self:
+        """Makes it of what the loop bears changed and unchanged."""
+        limits = (borne.limit, base.limit), (borne.alone, base.alone)
+        factor, alone = (of.stiffness_N_m / to.stiffness_N_m if to.stiffness_N_m else 0.0 for of, to in limits)
+        return cls(words, borne.limit, factor, borne.alone, alone, borne.values)
 
 
 @dataclass(frozen=True)
@@ -75,11 +92,12 @@ class Advice:
         not_varied: what the loop has and was taken as described.
         hand: its mass, kg, damping, N s/m, and stiffness, N/m; None where there is none.
         grip: through which it holds, N s/m and N/m; None where there is none.
-        described: the limit of the loop as described, with the element advised or without any.
+        unchanged: what the loop bears in the hardest corners, as what the changes are held against.
         changed, without: that after each change of the device, and without each cause of buzzing, best first.
         assumed: each assumed number with the limit at half and at double of it.
         own: of a scene with a wall: its stiffness, and what it does with its own elements; None where it bears all.
         scene: that shows the advised wall; None where nothing is safe.
+        provisos: what the verdict of that scene says beside its word.
         breaks: that shows the case which breaks first, on the softest wall on which its verdict is not steady; where
             there is none, on the wall that broke, up to the end of the stretch in which that was seen.
     """
@@ -95,7 +113,7 @@ class Advice:
     found: Found
     formulas: tuple[Formula, ...]
     published: tuple[Published, ...]
-    described: Limit
+    unchanged: Changed
     changed: tuple[Changed, ...]
     without: tuple[Changed, ...]
     assumed: tuple[tuple[Assumed, Limit, Limit], ...]
@@ -103,6 +121,7 @@ class Advice:
     scene: Scene | None
     breaks: Scene | None
     runs: int
+    provisos: tuple[str, ...] = ()
 
     @property
     def headline(self) -> str:
@@ -126,18 +145,16 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
     stage("changes of the device")
     altered, ideal, otherwise = changes(loop), idealised(loop), assumed_otherwise(loop, keys)
     loops = [loop, *altered.values(), *ideal.values(), *otherwise.values()]
-    described, *others = changed_limits(trial, loops, found.advised)
-    limits = iter(others)
+    base, *others = changed_limits(trial, loops, found)
+    borne = iter(others)
 
     def rows(some: dict[str, Scene]) -> tuple[Changed, ...]:
-        base = described.stiffness_N_m
-        made = zip(some, limits, strict=False)
-        found = (Changed(words, limit, limit.stiffness_N_m / base if base else 0.0) for words, limit in made)
-        return tuple(sorted(found, key=lambda row: -row.factor))
+        made = [Changed.from_borne(words, next(borne), base) for words in some]
+        return tuple(sorted(made, key=lambda row: -row.factor))
 
     changed, without = rows(altered), rows(ideal)
-    by_number = dict(zip(otherwise, limits, strict=True))
-    held = loop.hand if scene.hand else None
+    by_number = {number: each.limit for number, each in zip(otherwise, borne, strict=True)}
+    held, shown = loop.hand if scene.hand else None, advised_scene(subject, loop, found)
     own, notes = None, [] if is_ideal(loop) or loop.transmission else [_RIGID]
     if subject.has_task and scene.wall and scene.wall.stiffness:
         wall = Tried(scene.wall.stiffness, tuple(scene.dissipation))
@@ -157,14 +174,15 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
         found=found,
         formulas=tuple(formulas(loop)),
         published=PUBLISHED.get(subject.name, ()),
-        described=described,
+        unchanged=Changed.from_borne(UNCHANGED, base, base),
         changed=changed,
         without=without,
         assumed=tuple((of, by_number[of.key, 0.5], by_number[of.key, 2.0]) for of in assumed),
         own=own,
-        scene=advised_scene(subject, loop, found),
+        scene=shown,
         breaks=_breaking(subject, loop, found),
         runs=trial.runs,
+        provisos=_provisos(shown) if shown else (),
     )
 
 
@@ -185,6 +203,11 @@ def is_ideal(loop: Scene) -> bool:
 def advised_scene(subject: Subject, loop: Scene, found: Found) -> Scene | None:
     """Returns the advised wall with its element, called an upper bound if it is one; None on no wall."""
     return _shown(subject, loop, found, found.stiffness_N_m, Case(1.0), "upper bound, " if is_ideal(loop) else "")
+
+
+def _provisos(scene: Scene) -> tuple[str, ...]:
+    found = judge_scene(scene, installed_kinds(), looks_s=LOOKS_S, frictionless=True)
+    return tuple(found.entries()["stability"]["provisos"])
 
 
 def _shown(

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from haploop.launch.plan.effects import all_effects
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Scene
+from haploop.tools.advise.families import Values, around
+from haploop.tools.advise.search import Found
 from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case
-from haploop.tools.advise.walls.corners import ASSUMED, DELAY, delay_s, scale_quantities
-from haploop.tools.advise.walls.limit import Limit, Query, ladder, limits
+from haploop.tools.advise.walls.corners import ASSUMED, DELAY, Corner, delay_s, ranges, scale_quantities
+from haploop.tools.advise.walls.limit import LEAST_N_M, Limit, Query, ladder, limits
 from haploop.tools.advise.walls.trial import Trial
-from haploop.tools.advise.withstand import Best
 
 # How closely these limits are found.
 CLOSE = 0.06
@@ -27,6 +29,8 @@ _SCALED = (
     ("transmission damping doubled", "transmission.damping", 2.0),
     ("position noise halved", "noise.deviation", 0.5),
 )
+# Below this share of the wall it does not matter how little an element bears.
+_LEAST = 0.1
 # Viscous damping that is added, N s/m.
 _ADDED_DAMPING = 1.0
 
@@ -70,14 +74,52 @@ def scaled(loop: Scene, key: str, factor: float) -> Scene:
     return with_value(loop, key, value_at(loop, key) * factor)
 
 
-def changed_limits(trial: Trial, loops: Sequence[Scene], best: Best) -> list[Limit]:
-    """Returns the limits of changed loops, nothing else changed, at the holds tried first.
+@dataclass(frozen=True)
+class Borne:
+    """What a loop bears in its hardest corners.
 
-    With the element advised or without any, whichever bears more: what suits one loop may not suit the other.
+    Attributes:
+        limit: with the element at the size that suits it, or without any, whichever bears more.
+        alone: without an element.
+        values: that size; empty where none bears as much.
     """
-    top = max(1.0, best.nominal.stiffness_N_m)
-    cases, rungs = tuple(Case(hold) for hold in FIRST_HOLDS), ladder(top / 4.0, top * 4.0, 1.26)
-    choices = [best.family.elements(best.values)] + [()] * bool(best.values)
-    found = limits(trial, [Query(loop, elements, cases, rungs) for loop in loops for elements in choices], CLOSE)
-    each = len(choices)
-    return [max(found[i : i + each], key=lambda limit: limit.stiffness_N_m) for i in range(0, len(found), each)]
+
+    limit: Limit
+    alone: Limit
+    values: Values = ()
+
+
+def changed_limits(trial: Trial, loops: Sequence[Scene], found: Found) -> list[Borne]:
+    """Returns what changed loops bear, nothing else changed but the size of the element, which is tuned anew.
+
+    As described and in the corners that are hardest on the loop unchanged, where the change left them, at the holds
+    tried first: as described alone the largest element that just does not buzz bears most, and a change tells nothing.
+    """
+    best, near = found.advised, found.stiffness_N_m or found.advised.nominal.stiffness_N_m
+    sizes = around(best.values) if best.values else []
+    queries: list[Query] = []
+    for loop in loops:
+        cases = _cases(loop, found.hardest)
+        for values in sizes:
+            queries.append(
+                Query(loop, best.family.elements(values), cases, _rungs(near), max(LEAST_N_M, near * _LEAST))
+            )
+        queries.append(Query(loop, (), cases, _rungs(found.alone_N_m or near)))
+    some, each, borne = limits(trial, queries, CLOSE), len(sizes) + 1, []
+    for i in range(0, len(some), each):
+        *tuned, alone = some[i : i + each]
+        limit, values = max(zip(tuned, sizes, strict=True), key=lambda row: row[0].stiffness_N_m, default=(alone, ()))
+        with_one = limit.stiffness_N_m > alone.stiffness_N_m
+        borne.append(Borne(limit, alone, values) if with_one else Borne(alone, alone))
+    return borne
+
+
+def _rungs(near_N_m: float) -> tuple[float, ...]:
+    return ladder(max(LEAST_N_M, near_N_m / 2.0), max(LEAST_N_M, near_N_m) * 2.0, 1.3)
+
+
+def _cases(loop: Scene, hardest: Sequence[Corner]) -> tuple[Case, ...]:
+    """Returns the cases of a changed loop; what it has no longer is not varied, nor is what is assumed."""
+    names = ranges(loop)
+    corners = [tuple((name, factor) for name, factor in corner if name in names) for corner in hardest]
+    return tuple(Case(hold, corner) for corner in dict.fromkeys(((), *corners)) for hold in FIRST_HOLDS)

@@ -151,6 +151,11 @@ def beside(values: Values) -> list[Values]:
     ]
 
 
+def around(values: Values) -> list[Values]:
+    """Returns parameters at half, 0.7, once and 1.4 of their sizes, all by the same."""
+    return [tuple(_rounded(value * FACTOR**half) for value in values) for half in (-1.0, -0.5, 0.0, 0.5)]
+
+
 def together(damping: Values, inertia: Values) -> list[Values]:
     """Returns combinations of what is best alone, which are the largest of each."""
     return [(_rounded(damping[0] * b), _rounded(inertia[0] * m)) for b, m in itertools.product(_OF_BOTH, _OF_BOTH)]

@@ -44,9 +44,10 @@ def figure_of(told: Advice) -> Figure:
     Raises FigureError where matplotlib is missing.
     """
     changed = (*told.changed, *told.without)
-    others = [(row.words, row.limit) for row in changed]
-    for of, half, double in (row for row in told.assumed if moves(row[1], row[2], told.described)):
-        others += [(f"{of.key} halved (assumed)", half), (f"{of.key} doubled (assumed)", double)]
+    has_element = bool(told.found.advised.values)
+    others = [(row.words, row.limit, row.alone if has_element else None) for row in changed]
+    for of, half, double in (row for row in told.assumed if moves(row[1], row[2], told.unchanged.limit)):
+        others += [(f"{of.key} halved (assumed)", half, None), (f"{of.key} doubled (assumed)", double, None)]
     lines = [line for sentence in sentences(told) for line in textwrap.wrap(sentence, _LETTERS)]
     heights = [
         (len(told.found.bests) + len(told.formulas) + len(told.published)) * _ROW_IN + _BESIDE_IN + 0.2 * len(lines),
@@ -95,10 +96,10 @@ def _walls(ax: Axes, told: Advice, lines: list[str]) -> list[float]:
     return marked
 
 
-def _changes(ax: Axes, told: Advice, others: list[tuple[str, Limit]]) -> list[float]:
-    """Marks what every change makes of the loop as described, with a line from it; returns the stiffnesses, N/m."""
-    nominal, seen = told.described.stiffness_N_m, set[str]()
-    for row, (_, limit) in enumerate(others):
+def _changes(ax: Axes, told: Advice, others: list[tuple[str, Limit, Limit | None]]) -> list[float]:
+    """Marks what the loop bears after every change, with a line from what it does as it is; returns these, N/m."""
+    nominal, seen = told.unchanged.limit.stiffness_N_m, set[str]()
+    for row, (_, limit, alone) in enumerate(others):
         stiffness = limit.stiffness_N_m
         size = (stiffness > nominal * WORTH) - (stiffness * WORTH < nominal)
         colour, label = (
@@ -110,11 +111,14 @@ def _changes(ax: Axes, told: Advice, others: list[tuple[str, Limit]]) -> list[fl
             ax.plot([nominal / 1e3, stiffness / 1e3], [row, row], color=colour, linewidth=2.0)
         _mark(ax, row, stiffness, "o", colour, "" if label in seen or not stiffness else label)
         seen |= {label} if stiffness else set()
-        _beside(ax, row, ("", "", format_limit(limit)))
+        _beside(ax, row, ("", format_limit(limit), format_limit(alone) if alone else ""))
     if nominal:
-        ax.axvline(nominal / 1e3, color=style.INK, linewidth=1.2, label="as described", zorder=1)
-    _finish(ax, "the same loop as described, with one change of the device", [name for name, _ in others], [])
-    return [nominal, *(limit.stiffness_N_m for _, limit in others)]
+        ax.axvline(nominal / 1e3, color=style.INK, linewidth=1.2, label="as it is", zorder=1)
+    has_element = bool(told.found.advised.values)
+    title = "after one change of the device, in the hardest corners" + ", the element tuned anew" * has_element
+    _finish(ax, title, [name for name, *_ in others], [])
+    _beside(ax, -0.85, ("", "element", "without") if has_element else ("", "", ""), bold=True)
+    return [nominal, *(limit.stiffness_N_m for _, limit, _ in others)]
 
 
 def _mark(ax: Axes, row: int, stiffness: float, shape: str, colour: str, label: str, face: str = "") -> None:

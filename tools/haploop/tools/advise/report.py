@@ -8,7 +8,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from haploop.tools.advise.advice import READING, Advice
+from haploop.tools.advise.advice import READING, Advice, Changed
 from haploop.tools.advise.changes import CLOSE
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.walls.store import Failure
@@ -21,9 +21,12 @@ _NOTHING_BREAKS = "nothing that was tried"
 # Trials hold force and motion against what is felt, with friction projected on the steps; a run is judged otherwise.
 _SHOWN_AT_END = "; advice_breaks.toml ends with it: its swing and its force there are felt, whatever its verdict"
 _SHOWN_BY_NONE = "; no scene shows it: with friction solved exactly, as in a run, no hand would feel it"
+_FELT, _FELT_BOTH = {True: "force", False: "motion"}, "force and as motion"
+_AT, _TURNS = "at {hz:.0f} Hz", "at no one frequency, turning {turns} times in {within:g} s"
 # A changed limit tells something where it differs by more than how closely it is known.
 _TELLS = 1.2
 _NO_CHANGE, _NO_LOSS = "no single change that was tried gains a fifth", "no single change that was tried costs a sixth"
+_TUNED, _TIMES, _TIMES_ALONE = ", be the element tuned anew or left out", "{0}: {1} times", " ({0} without an element)"
 _HAND = "of {0} kg, {1} N s/m and {2} N/m{3}, each 20 % more or less; another may make this wall buzz (--hand)"
 _GRIP = ", holding through a grip of {0} N s/m and {1} N/m"
 _NO_HAND = "none but its force: a hand may make this wall buzz (--hand)"
@@ -57,6 +60,7 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     """Returns the lines that a builder reads first, each with its name."""
     found, best = told.found, told.found.advised
     safe = _SAFE.format(format_stiffness(found.stiffness_N_m), best.family.phrase(best.values))
+    safe = ", ".join([safe, *told.provisos])
     lines = [("at most" if told.is_ideal else "safe up to", safe if found.stiffness_N_m else _NO_WALL)]
     lines.append(("for a hand", describe_hand(told)))
     if found.as_assumed:
@@ -68,10 +72,10 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     if broken and not (told.breaks and told.breaks.run.verdict == "pushed"):
         breaks += _SHOWN_AT_END if told.breaks else _SHOWN_BY_NONE
     lines.append(("breaks first", breaks))
-    gains = [f"{row.words}: {fixed(row.factor, 2)} times" for row in told.changed if row.factor >= _TELLS]
-    lines.append(("gains most", "; ".join(gains[:3]) or _NO_CHANGE))
+    gains = [_times(told, row) for row in told.changed if max(row.factor, row.alone_factor) >= _TELLS]
+    lines.append(("gains most", "; ".join(gains[:3]) or _NO_CHANGE + _TUNED * bool(best.values)))
     worst = sorted((*told.changed, *told.without), key=lambda row: row.factor)
-    loses = [f"{row.words}: {fixed(row.factor, 2)} times" for row in worst if row.factor * _TELLS <= 1.0]
+    loses = [_times(told, row) for row in worst if row.factor * _TELLS <= 1.0]
     lines.append(("loses most", "; ".join(loses[:3]) or _NO_LOSS))
     if told.published:
         values = [f"{format_stiffness(value.stiffness_N_m)} ({value.by})" for value in told.published]
@@ -81,6 +85,11 @@ def answer(told: Advice) -> list[tuple[str, str]]:
         does = f"buzzes: {describe(failure)}" if failure else "bears every case"
         lines.append(("its own wall", f"{format_stiffness(own)} {does}"))
     return lines
+
+
+def _times(told: Advice, row: Changed) -> str:
+    words = _TIMES.format(row.words, fixed(row.factor, 2))
+    return words + (_TIMES_ALONE.format(fixed(row.alone_factor, 2)) if told.found.advised.values else "")
 
 
 def assumes(told: Advice, right: Best) -> str:
@@ -93,7 +102,7 @@ def assumes(told: Advice, right: Best) -> str:
     else:
         phrase = right.family.phrase(right.values)
         costs = _COSTS.format(
-            it, format_limit(right.safe), phrase, measure if moves(half, double, told.described) else ""
+            it, format_limit(right.safe), phrase, measure if moves(half, double, told.unchanged.limit) else ""
         )
     return _ASSUMED.format(", ".join(of.key for of, _, _ in told.assumed), them, costs).strip()
 
@@ -118,9 +127,11 @@ def describe(failure: Failure) -> str:
         return f"the device leaves its limits; {failure.case}"
     if not failure.frequency_Hz:
         return failure.case
-    felt = "force" if failure.by_force else "motion"
+    felt = _FELT[failure.by_force] if failure.other_felt < 1.0 else _FELT_BOTH
     swing = f"{amount(failure.force_N, 'N', 2)} and {amount(failure.motion_m, 'm', 2)} peak to peak"
-    return f"{swing} at {failure.frequency_Hz:.0f} Hz, felt as {felt}; {failure.case}"
+    words = _AT if failure.is_line else _TURNS
+    when = words.format(hz=failure.frequency_Hz, turns=failure.turns, within=failure.within_s)
+    return f"{swing} {when}, felt as {felt}; {failure.case}"
 
 
 def moves(half: Limit, double: Limit, nominal: Limit) -> bool:
@@ -163,11 +174,19 @@ def _limits(told: Advice) -> Table:
 
 
 def _changes(told: Advice) -> Table:
-    limit = f"limit, to {CLOSE * 100:.0f} %"
-    table = make_table("one change, or an ideal", limit, "times", numbers=(limit, "times"))
-    for row in (*told.changed, *told.without):
-        style = "bold" if row.factor >= _TELLS else ""
-        table.add_row(row.words, format_limit(row.limit), fixed(row.factor, 2), style=style)
+    """Returns a row a change: with the element tuned anew, and without one; one column where none is advised."""
+    has_element = bool(told.found.advised.values)
+    close = f"to {CLOSE * 100:.0f} %"
+    heads = (
+        (f"element tuned\nanew, {close}", "times\n", f"no element,\n{close}", " times\n")
+        if has_element
+        else (close, "times")
+    )
+    table = make_table("one change, or an ideal", *heads, numbers=heads)
+    for row in (told.unchanged, *told.changed, *told.without):
+        style = "bold" if max(row.factor, row.alone_factor) >= _TELLS else ""
+        numbers = (format_limit(row.limit), fixed(row.factor, 2), format_limit(row.alone), fixed(row.alone_factor, 2))
+        table.add_row(row.words, *numbers[: len(heads)], style=style)
     return table
 
 

@@ -22,7 +22,7 @@ from haploop.tools.advise.families import (
 from haploop.tools.advise.hardest import hardest
 from haploop.tools.advise.others import Choice, Hidden, hiding, others_bearing, worth_more
 from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, attack, every_case
-from haploop.tools.advise.walls.corners import ranges
+from haploop.tools.advise.walls.corners import Corner, ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, Limit, Query, ladder, limits
 from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.advise.withstand import (
@@ -42,6 +42,8 @@ from haploop.tools.advise.withstand import (
 _MANY, _WIDE, _ONE = (0.0, 0.5, 1.0), (-1.0, 0.0, 1.0), (0.5,)
 # So many of the corners that are hardest on the wall alone take part in that.
 _HARDEST = 6
+# So many of each wall's hardest tell what a change would gain.
+_TOLD = 2
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,7 @@ class Found:
         others: elements that bear no wall of ``simple_N_m`` as described, the best of the simple ones.
         hidden: elements that render less than their wall, and may hold more than any other.
         alone_N_m: the wall without an element that withstood as much.
+        hardest: the corners that are hardest on the wall with the element advised, and on that without.
         fell: what bore more in every corner, and the softest wall, N/m, known not to bear everything with it.
     """
 
@@ -72,6 +75,7 @@ class Found:
     hidden: tuple[Hidden, ...] = ()
     fell: tuple[tuple[Best, float], ...] = ()
     alone_N_m: float = 0.0
+    hardest: tuple[Corner, ...] = ()
 
     def attacked(self, best: Best) -> tuple[float, bool] | None:
         """Returns the wall, N/m, of one of ``bests`` that withstood the attack, and True, or the softest that did not.
@@ -129,14 +133,17 @@ def search(
     compared = rivals(bests, worst)
     won = withstand(loop, trial, compared, of)
     fell = fallen(compared, won)
-    alone = withstand(loop, trial, [rival for rival in compared if rival.best.family is NOTHING], of).bound_N_m
+    alone = withstand(loop, trial, [rival for rival in compared if rival.best.family is NOTHING], of)
+    hard = tuple(dict.fromkeys((*won.hardest[:_TOLD], *alone.hardest[:_TOLD])))
     choice = won.best.family, won.best.values
     described = known.get(choice) or nominal([choice], *rungs)[choice]
     best = replace(won.best, nominal=described)
     count = len(BEYOND) * len(attack(of, won.hardest)) + len(every_case(of, hardest=won.hardest))
     shown = tuple(best if each.family is best.family else each for each in bests)
     others = tuple(family for family in OTHERS if family not in good)
-    return Found(shown, best, won.bound_N_m, as_assumed, won.broken, count, others, simple, hidden, fell, alone)
+    return Found(
+        shown, best, won.bound_N_m, as_assumed, won.broken, count, others, simple, hidden, fell, alone.bound_N_m, hard
+    )
 
 
 def fallen(compared: Sequence[Rival], won: Rival) -> tuple[tuple[Best, float], ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from haploop.tools.cli.scenes import kinds_with
 from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.buzz import BuzzFinder
 from haploop.tools.dissipate.figure import make_figure
-from haploop.tools.dissipate.outcome import Outcome, Recording, Trace, make_outcome
+from haploop.tools.dissipate.outcome import Outcome, Recording, Trace, make_outcome, make_tried
 from haploop.tools.dissipate.position_noise import PositionNoise
 from haploop.tools.dissipate.report import make_report
 from haploop.tools.dissipate.samples import LogRecording, RecordingError, read_scene
@@ -125,6 +125,8 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
     booking, noisier = Booking(*makings), Booking(*makings)
     # Of positions alone: what is recorded beside them does not come of their noise.
     noise = PositionNoise() if isinstance(recording, TextRecording) and not recording.recorded else None
+    all_of = None if scene.dissipation else _scene_of_all(request, scene, kinds)
+    trying = Booking(all_of, *makings[1:-1]) if all_of else None
     found = BuzzFinder(recording.period_s, recording.delay_s)
     trace = Trace(recording.period_s, 2 + 2 * len(scene.dissipation) + 3 * recording.has_force)
     end_x_m, shown = None, console(stderr=True)
@@ -132,6 +134,8 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
         for piece in recording.samples():
             trace.add(booking.add(piece))
             found.add(piece)
+            if trying:
+                trying.add(piece)
             if noise:
                 noisier.add(noise.added_to(piece))
             end_x_m = piece.end_x_m
@@ -140,7 +144,17 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
     if end_x_m is not None:
         booking.finish(end_x_m)
     noisy = noise and (noise.deviation_m, noisier.true_J)
-    return make_outcome(recording, booking, trace, scene, kinds, noisy, found)
+    outcome = make_outcome(recording, booking, trace, scene, kinds, noisy, found)
+    return replace(outcome, tried=tuple(make_tried(trying, all_of, kinds))) if trying and all_of else outcome
+
+
+def _scene_of_all(request: Request, scene: Scene, kinds: dict[str, type[Element]]) -> Scene | None:
+    """Returns the scene with every element that acts on a recorded motion, at a size of 1; None where one cannot."""
+    inward = ["unidirectional-damping damping=1"] if scene.wall else []
+    selection = replace(request.selection, dampings=["1"], masses=["1"], elements=inward)
+    with suppress(RecordingError):
+        return _open(replace(request, selection=selection), kinds)[1]
+    return None
 
 
 def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording, Scene]:

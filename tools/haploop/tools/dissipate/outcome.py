@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,8 @@ Recording = LogRecording | TextRecording
 _MOST = 8192
 # Length of the detail, s.
 _CLOSE_S = 0.1
+# Where no element is named those at hand are tried at sizes of this largest force.
+EQUAL_N = 0.1
 # The terms of a sum that cancel leave so much of them.
 _ROUNDING = 1e-12
 
@@ -147,6 +149,7 @@ class Outcome:
         noise_m: noise of the recorded positions; None where rates were recorded beside them.
         buzz_word, buzz: whether the recording buzzes, and the buzz.
         slow: the widest line of a slower motion; None of one without.
+        tried: where no element was named, those at hand at sizes of equal largest force, ``EQUAL_N``, best first.
         left_out: a line that was taken for the shape of a slower motion, where no buzz was seen.
     """
 
@@ -160,6 +163,7 @@ class Outcome:
     buzz: Buzz | None
     slow: Line | None
     left_out: Overtone | None = None
+    tried: tuple[ElementOutcome, ...] = ()
 
     @property
     def main_Hz(self) -> float | None:
@@ -200,6 +204,7 @@ class Outcome:
             "samples": notes.pop("rows"),
             **notes,
             "elements": [asdict(element) for element in self.elements],
+            "tried": [asdict(element) for element in self.tried],
             "force": self.force and self.force.as_data(),
         }
 
@@ -255,6 +260,30 @@ def make_outcome(
         found.slow,
         None if buzz else found.overtone(),
     )
+
+
+def make_tried(booking: Booking, scene: Scene, kinds: Mapping[str, type[Element]]) -> list[ElementOutcome]:
+    """Makes the outcomes of elements at the sizes at which their largest force is ``EQUAL_N``; none of one without.
+
+    Their forces are in proportion to their one parameter, and so are their energies, which were booked at a size of 1.
+    """
+    tried = []
+    for row, table in enumerate(scene.dissipation):
+        [name] = table.parameters
+        strongest_N = float(booking.strongest_N[row])
+        if not strongest_N:
+            continue
+        size = EQUAL_N / strongest_N
+        sized = replace(table, parameters={name: float(f"{size:.3g}")})
+        label = _label(sized, kinds[table.name].parameters())
+        sampled_J, true_J, taken_J, given_J = (
+            size * float(of[row]) for of in (booking.sampled_J, booking.true_J, booking.taken_J, booking.given_J)
+        )
+        fast_share, entries = float(booking.fast_share[row]), {"acts": table.acts, **sized.parameters}
+        tried.append(
+            ElementOutcome(table.name, entries, label, sampled_J, true_J, taken_J, given_J, EQUAL_N, fast_share)
+        )
+    return sorted(tried, key=lambda element: -element.true_J)
 
 
 def _label(table: ElementTable, declared: Mapping[str, tuple[Quantity, object]]) -> str:

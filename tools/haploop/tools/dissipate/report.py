@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from rich.console import Group, RenderableType
+from rich.table import Table
 from rich.text import Text
 
 from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.dissipate.force_book import Passivity
-from haploop.tools.dissipate.outcome import ElementOutcome, ForceOutcome, Outcome
+from haploop.tools.dissipate.outcome import EQUAL_N, ElementOutcome, ForceOutcome, Outcome
 from haploop.tools.dissipate.swing_sentences import NEXT, buzz_sentence, filtered_out, low_pass
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
@@ -81,9 +82,19 @@ def make_report(outcome: Outcome) -> RenderableType:
     first = doubtful(outcome)
     doubts = [Text(sentence, style="bold yellow") for sentence in first]
     buzz = Text(buzz_sentence(outcome), style="bold" if outcome.buzz else "")
+    tried = [_tried(outcome), Text(_EQUAL.format(equal=amount(EQUAL_N, "N")), style="dim")] if outcome.tried else []
     said = [sentence for sentence in note_sentences(outcome) if sentence not in first] + [NEXT] * bool(outcome.buzz)
     notes = (Text(sentence, style="dim") for sentence in said)
-    return Group(*doubts, buzz, head, *([table] if rows(outcome) else []), *notes)
+    return Group(*doubts, buzz, head, *([table] if rows(outcome) else []), *tried, *notes)
+
+
+def _tried(outcome: Outcome) -> Table:
+    """Makes the table of elements at sizes of equal largest force, where none was named."""
+    numbers = ("takes", "gives back", "fast")
+    table = make_table(f"{amount(EQUAL_N, 'N')} at most", *numbers, numbers=numbers)
+    for each in outcome.tried:
+        table.add_row(each.label, amount(each.true_J, "J"), amount(each.given_J, "J"), f"{100 * each.fast_share:.0f} %")
+    return table
 
 
 def rows(outcome: Outcome) -> list[ElementOutcome]:
@@ -141,6 +152,10 @@ _ROUNDED = "The times are rounded to {step}: even samples at {rate:.6g} Hz fit t
 _MAY_BE_WRONG = (
     "Energies and rate may be wrong: {percent:.0f} % of the periods are more than a tenth off the others, and all are "
     "taken for equal. Where the samples were even, give their rate (--rate)."
+)
+_EQUAL = (
+    "Each element at the size whose largest force on this motion is {equal}; energies are in proportion to sizes. Fast "
+    "is what of its force is faster than a quarter of the sampling rate: noise, unless the device buzzed as fast."
 )
 _SIZES = "Each element is tried at the size given here alone; at another it takes another amount."
 _IN_CONTACT = "Elements act in contact with the wall only; one with acts=always would everywhere."

@@ -14,6 +14,8 @@ from haploop.protocol.scene.scene import Scene
 
 # So many turns within a stretch are a buzz; what only follows a hand that sways turns once.
 TURNS = 4
+# A line holds so much of the power, at least; that between two frequencies of the spectrum four fifths of its own.
+_LINE = 0.5
 # Turns of less than this are rounding: an atom is as wide.
 _LEAST_M = 1e-10
 
@@ -31,6 +33,8 @@ class Buzz(NamedTuple):
         frequency_Hz: of whichever is felt more.
         times_felt: the larger of both as a multiple of what is felt; 0 where it does not go to and fro.
         by_force: whether that is the force.
+        other_felt: the smaller of both as such a multiple.
+        is_line: whether half of what is felt more lies at that frequency: else it has none.
     """
 
     turns: np.ndarray
@@ -39,6 +43,8 @@ class Buzz(NamedTuple):
     frequency_Hz: np.ndarray
     times_felt: np.ndarray
     by_force: np.ndarray
+    other_felt: np.ndarray
+    is_line: np.ndarray
 
 
 def felt_m(frequency_Hz: np.ndarray) -> np.ndarray:
@@ -72,13 +78,15 @@ def buzz(x: np.ndarray, measured: np.ndarray, command: np.ndarray, rate: float, 
     fro. So the measured position has to turn ``TURNS`` times before anything counts.
     """
     turns = _turns(measured)
-    (motion, f_motion), (force, f_force) = (np.zeros((2, len(turns))) for _ in range(2))
+    (motion, f_motion, line), (force, f_force, line_of_force) = (np.zeros((3, len(turns))) for _ in range(2))
     swings = np.flatnonzero(turns >= TURNS)
-    motion[swings], f_motion[swings] = ripple(x[:, swings], rate)
-    force[swings], f_force[swings] = ripple(command[:, swings], rate)
+    motion[swings], f_motion[swings], line[swings] = ripple(x[:, swings], rate)
+    force[swings], f_force[swings], line_of_force[swings] = ripple(command[:, swings], rate)
     by_motion, by_force = motion / felt_m(f_motion), force / felt_N(f_force)
-    frequency = np.where(by_force > by_motion, f_force, f_motion)
-    return Buzz(turns, motion, force, frequency, np.maximum(by_motion, by_force), by_force > by_motion)
+    is_force = by_force > by_motion
+    frequency, share = np.where(is_force, f_force, f_motion), np.where(is_force, line_of_force, line)
+    felt, other = np.maximum(by_motion, by_force), np.minimum(by_motion, by_force)
+    return Buzz(turns, motion, force, frequency, felt, is_force, other, share >= _LINE)
 
 
 def _turns(u: np.ndarray) -> np.ndarray:
@@ -91,8 +99,10 @@ def _turns(u: np.ndarray) -> np.ndarray:
     return (held[1:] * held[:-1] < 0.0).sum(axis=0)
 
 
-def ripple(u: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
+def ripple(u: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns what each column swings by, peak to peak, faster than ``TURNS`` turns a stretch, and how fast in Hz.
+
+    The third is the share of its power at that frequency and those beside it: little of spikes and of noise.
 
     The column's parabola is taken off first: a hand that sways would leave steps at the ends.
     """
@@ -101,4 +111,8 @@ def ripple(u: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
     u = u - parabolas @ (parabolas.T @ u)
     spectrum, frequencies = np.fft.rfft(u, axis=0), np.fft.rfftfreq(len(u), 1.0 / rate)
     spectrum[frequencies < min(RIPPLE_ABOVE_HZ, TURNS / 2.0 * rate / len(u))] = 0.0
-    return np.ptp(np.fft.irfft(spectrum, len(u), axis=0), axis=0), frequencies[np.abs(spectrum).argmax(axis=0)]
+    power = np.abs(spectrum) ** 2
+    peak, whole = power.argmax(axis=0), power.sum(axis=0)
+    near = np.abs(np.arange(len(power))[:, None] - peak) <= 1
+    share = np.divide(np.where(near, power, 0.0).sum(axis=0), whole, out=np.zeros_like(whole), where=whole > 0.0)
+    return np.ptp(np.fft.irfft(spectrum, len(u), axis=0), axis=0), frequencies[peak], share

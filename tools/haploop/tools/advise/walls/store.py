@@ -34,6 +34,8 @@ class Failure:
         gone: whether the device left its limits; the numbers are of no meaning then.
         motion_m, force_N, frequency_Hz, times_felt, by_force: of that stretch, as of ``Buzz``.
         tried: the case; None where it cannot be told.
+        other_felt, is_line, turns: as of ``Buzz``; turns are 0 where they were not counted.
+        within_s: how long the stretch is.
     """
 
     case: str
@@ -45,6 +47,10 @@ class Failure:
     times_felt: float = 0.0
     by_force: bool = False
     tried: Case | None = None
+    other_felt: float = 0.0
+    is_line: bool = True
+    turns: int = 0
+    within_s: float = 0.0
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any]) -> Self:

@@ -160,6 +160,7 @@ def _watch(
         for place in np.flatnonzero(bad).tolist():
             wall, case = members[place]
             failure = _failure(jobs[wall].cases[case], (stretch + 1) * STRETCH_S * late, seen.gone[place], found, place)
+            failure = replace(failure, within_s=STRETCH_S * late)
             worst = failed.setdefault(wall, failure)
             if worst.at_s == failure.at_s and worst.times_felt < failure.times_felt:
                 failed[wall] = failure
@@ -170,4 +171,6 @@ def _failure(case: Case, at_s: float, gone: bool, found: Buzz | None, place: int
         return Failure(case.words, at_s, gone=True, tried=case)
     motion_m, force_N, frequency_Hz, times_felt = (float(column[place]) for column in found[1:5])
     by_force = bool(found.by_force[place])
-    return Failure(case.words, at_s, False, motion_m, force_N, frequency_Hz, times_felt, by_force, case)
+    other_felt, is_line, turns = float(found.other_felt[place]), bool(found.is_line[place]), int(found.turns[place])
+    numbers = motion_m, force_N, frequency_Hz, times_felt, by_force
+    return Failure(case.words, at_s, False, *numbers, case, other_felt, is_line, turns)
