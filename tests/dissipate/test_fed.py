@@ -103,3 +103,13 @@ def test_what_a_log_says_of_a_swing_that_lasts_is_the_slope_of_its_own_book(tmp_
     late = t > 1.0
     slope_W = -float(np.polyfit(t[late], true_J[late], 1)[0])
     assert found.buzz.fed_W == pytest.approx(slope_W, rel=0.1)
+
+
+def test_where_the_sign_of_the_force_is_in_doubt_so_is_who_feeds_the_swing(tmp_path: Path) -> None:
+    found = booked(tmp_path, K * np.minimum(pressed(S), 0.0))
+    assert found.force
+    assert found.force.passivity == "other sign"
+    said = shown(make_report(found), 400)
+    assert "which way depends on its sign" in said
+    assert FEEDS not in said
+    assert TAKES not in said

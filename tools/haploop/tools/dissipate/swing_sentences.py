@@ -30,6 +30,10 @@ _TAKEN = (
     " Meanwhile the recorded force took {energy} out of this swing, {power}: something else feeds it, unless the force "
     "came later than was said (--delay)."
 )
+_EITHER = (
+    " Meanwhile the recorded force moved {energy} between itself and this swing, {power}; which way depends on its "
+    "sign, which is in doubt."
+)
 _NEITHER = " The recorded force neither fed this swing nor took from it, but for a hundredth of what went to and fro."
 _SLOWER = " It swings at {main:.3g} Hz, {width} peak to peak at most, which a hand can, too."
 NEXT = (
@@ -74,7 +78,8 @@ def buzz_sentence(outcome: Outcome) -> str:
         limits["when"] = _ONCE.format(from_s, to_s) if times == 1 else _AGAIN.format(times, from_s, to_s, buzz.lasts_s)
     words = _BUZZ[outcome.buzz_word].format(**limits)
     if outcome.buzz:
-        return words + _course(outcome.buzz) + _fed(outcome.buzz)
+        sign_is_known = not outcome.force or outcome.force.passivity != "other sign"
+        return words + _course(outcome.buzz) + _fed(outcome.buzz, sign_is_known)
     if slow := outcome.slow:
         words += _SLOWER.format(main=slow.frequency_Hz, width=amount(slow.width, "m"))
     if not (of := outcome.left_out):
@@ -91,10 +96,11 @@ def _course(buzz: Buzz) -> str:
     return words.format(amount(buzz.first_m, "m"), amount(buzz.last_m, "m"))
 
 
-def _fed(buzz: Buzz) -> str:
+def _fed(buzz: Buzz, sign_is_known: bool) -> str:
     if buzz.fed_W is None or buzz.fed_J is None:
         return ""
     words = _FED if buzz.is_fed else _TAKEN if -buzz.fed_W > LEAST_FED * buzz.moved_W else _NEITHER
+    words = words if sign_is_known or words == _NEITHER else _EITHER
     return words.format(energy=amount(abs(buzz.fed_J), "J"), power=amount(abs(buzz.fed_W), "W"))
 
 
