@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.report import doubtful, make_report, note_sentences
 from haploop.tools.dissipate.samples import Floats
 from haploop.tools.dissipate.text_recording import Layout
@@ -66,6 +67,9 @@ def test_times_that_are_uneven_are_the_first_thing_said_and_that_energies_may_be
     found = outcome(write(tmp_path / "jitter.csv", {"t": t, "x": motion(t)}), dampings=["2"])
     assert found.recording.notes.rounded_s == 0.0
     assert shown(make_report(found), 400).startswith("Energies and rate may be wrong: ")
+    words = [text.get_text() for part in make_figure(found).subfigs for text in part.texts]
+    assert any(each.startswith("Energies and rate may be wrong: ") for each in words)
+    assert found.as_data()["times_may_be_wrong"]
 
 
 def test_even_times_are_said_to_be_nothing_else(tmp_path: Path) -> None:

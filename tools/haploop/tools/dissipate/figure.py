@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.tools.dissipate.outcome import Outcome
-from haploop.tools.dissipate.report import buzz_sentence, conclusion, make_row, note_sentences, rows
+from haploop.tools.dissipate.report import buzz_sentence, conclusion, make_row, note_sentences, rows, uneven
 from haploop.tools.dissipate.samples import Floats
 from haploop.tools.figure import style
 from haploop.tools.render.units import prefix_for
@@ -172,4 +172,5 @@ def _answer(outcome: Outcome) -> list[str]:
     sentence = conclusion(outcome)
     words = f"{sentence[:1].upper()}{sentence[1:]}"
     room = {"max_lines": _MOST_ANSWER_LINES - 1, "placeholder": " …"}
-    return [*textwrap.wrap(buzz_sentence(outcome), _LINE_LETTERS), *textwrap.wrap(words, _LINE_LETTERS, **room)]
+    first = [line for each in (*uneven(outcome), buzz_sentence(outcome)) for line in textwrap.wrap(each, _LINE_LETTERS)]
+    return [*first, *textwrap.wrap(words, _LINE_LETTERS, **room)]

@@ -203,6 +203,7 @@ class Outcome:
             "main_Hz": self.main_Hz,
             "samples": notes.pop("rows"),
             **notes,
+            "times_may_be_wrong": recording.notes.is_uneven,
             "elements": [asdict(element) for element in self.elements],
             "tried": [asdict(element) for element in self.tried],
             "force": self.force and self.force.as_data(),

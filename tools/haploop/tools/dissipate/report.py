@@ -190,9 +190,13 @@ def note_sentences(outcome: Outcome) -> list[str]:
 
 def doubtful(outcome: Outcome) -> list[str]:
     """Returns what stands before the answer: that it may be wrong, and why."""
+    return [*uneven(outcome), *outcome.recording.notes.remarks, *filtered_out(outcome)]
+
+
+def uneven(outcome: Outcome) -> list[str]:
+    """Returns that energies and rate may be wrong, where much of the times is uneven."""
     notes = outcome.recording.notes
-    uneven = _MAY_BE_WRONG.format(percent=100.0 * notes.uneven / notes.rows)
-    return [*[uneven] * notes.is_uneven, *notes.remarks, *filtered_out(outcome)]
+    return [_MAY_BE_WRONG.format(percent=100.0 * notes.uneven / notes.rows)] if notes.is_uneven else []
 
 
 def _noise(outcome: Outcome) -> list[str]:
