@@ -26,7 +26,8 @@ _AT, _TURNS = "at {hz:.0f} Hz", "at no one frequency, turning {turns} times in {
 # A changed limit tells something where it differs by more than how closely it is known.
 _TELLS = 1.2
 _NO_CHANGE, _NO_LOSS = "no single change that was tried gains a fifth", "no single change that was tried costs a sixth"
-_TUNED, _TIMES, _TIMES_ALONE = ", be the element tuned anew or left out", "{0}: {1} times", " ({0} without an element)"
+_TUNED, _TIMES, _TIMES_ALONE = ", the element tuned anew", "{0}: {1} times", " ({0} without an element)"
+_GAINS_ALONE = "the wall without an element gains by more: {0}"
 _HAND = "of {0} kg, {1} N s/m and {2} N/m{3}, each 20 % more or less; another may make this wall buzz (--hand)"
 _GRIP = ", holding through a grip of {0} N s/m and {1} N/m"
 _NO_HAND = "none but its force: a hand may make this wall buzz (--hand)"
@@ -72,8 +73,13 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     if broken and not (told.breaks and told.breaks.run.verdict == "pushed"):
         breaks += _SHOWN_AT_END if told.breaks else _SHOWN_BY_NONE
     lines.append(("breaks first", breaks))
-    gains = [_times(told, row) for row in told.changed if max(row.factor, row.alone_factor) >= _TELLS]
+    gains = [_times(told, row) for row in told.changed if row.factor >= _TELLS]
     lines.append(("gains most", "; ".join(gains[:3]) or _NO_CHANGE + _TUNED * bool(best.values)))
+    of_alone = [row for row in told.changed if row.alone_factor >= _TELLS > row.factor]
+    if best.values and of_alone:
+        of_alone.sort(key=lambda row: -row.alone_factor)
+        some = [_TIMES.format(row.words, fixed(row.alone_factor, 2)) for row in of_alone[:3]]
+        lines.append(("without one", _GAINS_ALONE.format("; ".join(some))))
     worst = sorted((*told.changed, *told.without), key=lambda row: row.factor)
     loses = [_times(told, row) for row in worst if row.factor * _TELLS <= 1.0]
     lines.append(("loses most", "; ".join(loses[:3]) or _NO_LOSS))
