@@ -70,6 +70,7 @@ def test_elements_on_a_recorded_motion_take_what_the_formula_says(tmp_path: Path
     assert len(dissipate(recording, damping=np.array([1.0, 2.0])).elements) == 2
 
 
+@pytest.mark.slow
 def test_one_run_or_several_are_drawn_and_a_sweep_is_drawn_by_itself(tmp_path: Path) -> None:
     scene = load("fig6c", SHORT)
     one, other = (run(scene.set({"wall.stiffness": k}), tmp_path / str(k)) for k in (150, 200))

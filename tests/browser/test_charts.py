@@ -29,7 +29,7 @@ def test_a_line_goes_through_its_values_and_is_broken_where_there_are_none(stand
         assert first - 0.03 <= expected <= last + 0.03
 
 
-@pytest.mark.parametrize("diverged", [True, False])
+@pytest.mark.parametrize("diverged", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_run_drawn_behind_that_diverged_leaves_the_axis_to_the_run_on_show(stand_in, page, diverged):
     ramp = [0.01 * i / (ROWS - 1) for i in range(ROWS)]
     step = 2.0 / (ROWS - 1)
@@ -86,6 +86,7 @@ def test_the_wall_is_shaded_on_the_side_of_its_material(into_wall, solid, stand_
     assert filled == ([False, True] if solid == "below" else [True, False])
 
 
+@pytest.mark.slow
 def test_the_numbers_of_an_axis_leave_its_label_alone_however_large_they_are(stand_in, page):
     """The label's strip of pixels is the same beside −8 mJ and −900 mJ; of more, the unit climbs."""
 

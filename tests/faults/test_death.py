@@ -67,7 +67,8 @@ def test_a_node_killed_at_the_end_when_the_others_have_done_their_last_tick_is_n
     assert len(haploop.logger.read(run.out)["/controller"]["x"]) >= 200
 
 
-@pytest.mark.parametrize("role", first_and_slowly("logger", "controller", "plant"))
+@pytest.mark.slow
+@pytest.mark.parametrize("role", ["logger", "controller", "plant"])
 def test_a_node_that_hangs_is_named_after_the_deadline_the_user_has_set(role, running, undisturbed):
     run = running(sets=(*LONG, BRIEF))
     run.has_logged(200)

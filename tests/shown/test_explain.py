@@ -12,6 +12,7 @@ from haploop.launch.plan.effect import Effect
 from haploop.launch.plan.effects import EFFECTS, effects_of
 from haploop.tools.cli.app import app
 from haploop.tools.operations import bill, operations
+from helpers.scenes.effect_tables import slowly
 from helpers.scenes.every_effect import BESIDE, EVERYTHING, NAMING
 from helpers.scenes.least import KINDS, scene
 
@@ -24,7 +25,7 @@ PRESS = {
 }
 
 
-@pytest.mark.parametrize("name", NAMING)
+@pytest.mark.parametrize("name", [*[*NAMING][::4], *slowly(name for at, name in enumerate(NAMING) if at % 4)])
 def test_a_scene_with_an_effect_taken_out_executes_what_one_that_never_named_it_does(name):
     """Not one instruction more in plant or controller for all that effects can be."""
     rest = scene(**PRESS | NAMING[name] | {"hand": PRESS["hand"] | NAMING[name].get("hand", {})})
@@ -49,6 +50,7 @@ def test_a_single_dead_branch_would_be_seen():
     assert heavy.controller > light.controller
 
 
+@pytest.mark.slow
 def test_counts_are_the_same_each_time_and_leave_tracing_as_it_was():
     resolved = scene(**EVERYTHING)
     before = sys.gettrace()
@@ -61,7 +63,11 @@ def test_a_short_run_is_counted_too(ticks):
     assert operations(scene(duration=ticks / 1000), KINDS).per_tick > 0
 
 
-@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+@pytest.mark.parametrize(
+    "effect",
+    [*EFFECTS[::3], *slowly(each for at, each in enumerate(EFFECTS) if at % 3)],
+    ids=lambda effect: effect.name,
+)
 def test_a_scene_without_one_of_its_effects_is_the_scene_that_never_named_it(effect: Effect):
     """What goes with it is what cannot be there without it; the rest is left alone, and it can be run."""
     resolved = scene(**NAMING[effect.name], wall={"position": 0, "stiffness": 1})

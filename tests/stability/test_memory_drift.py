@@ -30,6 +30,7 @@ def test_a_memory_drifts_that_changes_one_way_at_a_rate_that_lasts(memory: Calla
     assert drifts([np.array([other, number]) for other, number in zip(others, memory(TIMES), strict=True)]) == changes
 
 
+@pytest.mark.slow
 def test_what_rests_while_a_passivity_observer_is_used_up_swings_when_it_is():
     """It seems to rest for a second or two; within half a minute it swings so that a hand feels it."""
     end = ended(observed())

@@ -38,6 +38,7 @@ def test_the_reference_stops_a_sliding_mass_where_and_when_coulomb_friction_does
     assert truth.energies["friction_heat"] == pytest.approx(mass * speed**2 / 2, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_reference_closes_its_own_books_with_every_effect_at_once():
     truth = simulate(scene(duration=0.1, device={"mass": 0.05, "damping": 0.0}, **EVERY_EFFECT))
     heats = {name: value for name, value in truth.energies.items() if "heat" in name}

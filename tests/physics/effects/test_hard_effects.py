@@ -107,7 +107,7 @@ def extreme(case: str, rates: tuple[int, int] = (10_000, 1_000), **more: Any) ->
     return scene(**tables | {"clock": clock, "duration": ticks / control_rate, "diverged_beyond": 1e3} | more)
 
 
-@pytest.mark.parametrize("rates", [*RATES[::2], *slowly(RATES[1::2])], ids=str)
+@pytest.mark.parametrize("rates", [RATES[0], *slowly(RATES[1:])], ids=str)
 @pytest.mark.parametrize("case", EXTREME)
 def test_a_free_plant_of_any_scale_and_step_never_gains_energy_and_its_books_close(case, rates):
     if rates[0] < 1_000 and case == "the same with friction":
