@@ -13,6 +13,7 @@ from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.launch.spec import make_output
 from haploop.logger.summary import finite
+from haploop.protocol.scene.paths import value_at, with_value
 from haploop.tools.advise.advice import Advice, AdviceData, advice, advice_data
 from haploop.tools.advise.figure import draw
 from haploop.tools.advise.report import report, sentences
@@ -51,6 +52,8 @@ def advise(
             leave(str(error), WRONG_USE)
         try_out(elements_of(asked.scene), kinds)
         tried = Case(1.0).scene(make_loop(asked.scene, asked.has_task))
+        # The stiffness of a loop that is searched is a place holder.
+        tried = with_value(tried, "wall.stiffness", value_at(asked.scene, "wall.stiffness"))
         asked = replace(asked, notes=(*print_notes(tried, kinds), *asked.notes))
         out = _output(out, asked.name)
         store = Store(out / WALLS)
