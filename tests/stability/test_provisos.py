@@ -115,8 +115,8 @@ def test_what_grows_is_never_steady_however_little_it_grew_while_it_was_watched(
     change = rate_1_s * watched_s / 2.0
     swing = Swing(
         watched_s, 1.0, 1e-5, True, True, False, (change, change), (1e-4, 1e-4), rate_1_s, 1e-4, width_m=4e-6,
-        spread_m=1e-7, most_m=5e-6, moved_m=5e-6, at_first=1.0, at_last=1.0, frequency_Hz=40.0, ripple_N=0.0,
-        covers=True, times_felt=0.2, settles_s=0.2,
+        told_m=4e-6, spread_m=1e-7, most_m=5e-6, moved_m=5e-6, at_first=1.0, at_last=1.0, frequency_Hz=40.0,
+        ripple_N=0.0, covers=True, times_felt=0.2, settles_s=0.2,
     )  # fmt: skip
     assert decide(swing, last=False).word != "steady"
     still = swing._replace(changes=(0.0, 0.0))
@@ -128,11 +128,12 @@ def test_of_an_unfelt_swing_that_was_there_all_along_no_time_is_told_after_which
     monkeypatch.setattr(looks, "decide", lambda swing, *, last: swings.append(swing) or decide(swing, last=last))
     settled = found(scene(**pressed(encoder={"resolution": 1e-5}, wall={"position": 0.0, "stiffness": 300.0})))
     assert settled.why == "unfelt"
-    assert " within 1.7 s but for 4.73 µm" in settled.sentence()
+    width = f"{settled.width_m * 1e6:.3g} µm"
+    assert f" within 1.7 s but for {width}" in settled.sentence()
     swing = next(each for each in swings if decide(each, last=True).why == "unfelt")
     throughout = decide(swing._replace(settles_s=0.0), last=True)
     assert (throughout.word, throughout.settles_s) == ("steady", None)
-    assert "it swung by no more than 4.73 µm" in throughout.sentence()
+    assert f"it swung by no more than {width}" in throughout.sentence()
     assert " within " not in throughout.sentence()
 
 

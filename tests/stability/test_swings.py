@@ -7,7 +7,16 @@ import pytest
 
 from haploop.launch.stability.decide import decide
 from haploop.launch.stability.swing import Pushed, Swing, measure
-from haploop.launch.stability.traces import frequency_Hz, is_felt, most_felt, sizes, smallest_felt_m, trend, widths
+from haploop.launch.stability.traces import (
+    frequency_Hz,
+    is_felt,
+    level_widths,
+    most_felt,
+    sizes,
+    smallest_felt_m,
+    trend,
+    widths,
+)
 from haploop.logger.verdict.ripple import ripple
 from haploop.tools.render.report import finding_table
 from helpers.shown import shown
@@ -46,6 +55,15 @@ def test_a_frequency_is_told_between_the_lines_of_its_spectrum(frequency: float)
     t = np.arange(500) / 1000.0
     x = 1e-4 * np.sin(2 * np.pi * frequency * t + 0.4) + 3e-4
     assert frequency_Hz(x, 1000.0) == pytest.approx(frequency, abs=0.05)
+
+
+def test_the_width_that_is_told_of_a_swing_is_its_own_wherever_its_pieces_begin():
+    """Beside a hand that comes to rest slowly; about straight lines that the swing tilts it is up to a tenth more."""
+    t = np.arange(4000) / 1000.0
+    for periods in np.arange(4.0, 12.0, 0.3):
+        swing = 1e-3 * np.sin(2.0 * np.pi * periods / 0.332 * t) + 2e-3 * np.exp(-1.5 * t)
+        assert level_widths(swing, 332)[-3:].mean() == pytest.approx(2e-3, rel=0.03)
+    assert widths(1e-3 * np.sin(2.0 * np.pi * 2.8 / 0.166 * t), 166).max() > 1.08 * 2e-3
 
 
 def test_the_force_ripple_is_that_of_the_last_quarter():

@@ -295,7 +295,7 @@ def _finding(swing: Swing, word: str, why: str) -> Finding:
     # What is left of a swing that came to rest is rounding, which swings at no frequency.
     frequency_Hz, ripple_N = (0.0, 0.0) if swing.width_m < REST_M else (swing.frequency_Hz, swing.ripple_N)
     return Finding(
-        word, why, swing.push_N, swing.watched_s, swing.rate_1_s, swing.error_1_s, frequency_Hz, swing.width_m,
+        word, why, swing.push_N, swing.watched_s, swing.rate_1_s, swing.error_1_s, frequency_Hz, swing.told_m,
         swing.spread_m, ripple_N, swing.times_felt >= 1.0 or swing.width_m >= felt_m, None, needs_s, most_1_s,
         settles_s=swing.settles_s if why in ("rest", "unfelt") else None,
     )  # fmt: skip

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from haploop.launch.stability.traces import frequency_Hz, most_felt, sizes, smallest_felt_m, trend, widths
+from haploop.launch.stability.traces import frequency_Hz, level_widths, most_felt, sizes, smallest_felt_m, trend, widths
 from haploop.launch.stability.turns import turns_of
 from haploop.logger.verdict.ripple import RIPPLE_ABOVE_HZ, above, ripple
 
@@ -59,7 +59,8 @@ class Swing(NamedTuple):
         watched_s: time since the push.
         changes, errors: of the logarithm of the width over the second half, small and large, and their standard errors.
         rate_1_s, error_1_s: growth of the one that changes less, and its standard error.
-        width_m, spread_m, most_m: mean, half range and maximum of the widths in the last quarter of both.
+        width_m, most_m: mean and maximum of the widths in the last quarter of both.
+        told_m, spread_m: mean and half range of the widths there, about level trends of two pieces: what is told.
         moved_m: peak to peak over the last half of either, with its trend.
         at_first, at_last: width after the larger push over that after the smaller, in the first piece and at the last.
         frequency_Hz: of the end.
@@ -80,6 +81,7 @@ class Swing(NamedTuple):
     rate_1_s: float
     error_1_s: float
     width_m: float
+    told_m: float
     spread_m: float
     most_m: float
     moved_m: float
@@ -149,6 +151,7 @@ def _measured(
     small_trend, large_trend = trends
     slower = np.where(np.abs(large_trend.rate_1_s) < np.abs(small_trend.rate_1_s), large_trend[:2], small_trend[:2])
     tail = np.concatenate([small[:, -quarter:], large[:, -quarter:]], axis=1)
+    told = np.concatenate([level_widths(x[:, -quarter * size :], 2 * size) for x in (small_x, large_x)], axis=1)
     ends = [width[:, -quarter:].mean(axis=1) for width in (small, large)]
     columns = [
         *of_each,
@@ -156,7 +159,8 @@ def _measured(
         np.stack([each.error for each in trends], axis=-1),
         *slower,
         tail.mean(axis=1),
-        np.ptp(tail, axis=1) / 2.0,
+        told.mean(axis=1),
+        np.ptp(told, axis=1) / 2.0,
         tail.max(axis=1),
         np.maximum(*(np.ptp(x[:, last_half], axis=1) for x in (small_x, large_x))),
         large[:, 0] / np.maximum(small[:, 0], REST_M),
@@ -196,6 +200,7 @@ def _by_turns(swing: Swing, small_x: np.ndarray, large_x: np.ndarray, rate: floa
         rate_1_s=float(slower.trend.rate_1_s),
         error_1_s=float(slower.trend.error_1_s),
         width_m=(small.last_m + large.last_m) / 2.0,
+        told_m=(small.last_m + large.last_m) / 2.0,
         spread_m=abs(large.last_m - small.last_m) / 2.0,
         at_first=large.first_m / small.first_m,
         at_last=large.last_m / small.last_m,

@@ -40,6 +40,15 @@ def widths(x: np.ndarray, size: int) -> np.ndarray:
     return np.ptp(offset, axis=-1)
 
 
+def level_widths(x: np.ndarray, size: int) -> np.ndarray:
+    """Returns what ``widths`` does, about a trend that a swing does not tilt, fitted under a window of Hann.
+
+    A straight line through a piece that does not hold whole periods of a swing is tilted by it, and the width about
+    that is up to 15 % too large where a piece covers two periods; this one is, up to 8 %, and up to 3 % from four on.
+    """
+    return np.ptp(_about_trend(x, size)[0], axis=-1)
+
+
 def sizes(x: np.ndarray, size: int) -> np.ndarray:
     """Returns what ``widths`` would of a sine, from the mean square about the trend under a window of Hann.
 
@@ -47,13 +56,19 @@ def sizes(x: np.ndarray, size: int) -> np.ndarray:
     pieces turns into a growth that is none, of up to 0.2 in the logarithm over twelve of them; these come to 0.03 of it
     where a piece covers two periods, and to 0.002 where it covers three.
     """
+    offset, weight = _about_trend(x, size)
+    return np.sqrt(8.0 * np.vecdot(np.square(offset, out=offset), weight))
+
+
+def _about_trend(x: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Returns pieces of ``size`` samples about lines that are fitted under a window of Hann, and the window."""
     pieces = x[..., x.shape[-1] % size :].reshape(*x.shape[:-1], -1, size)
     t = np.arange(size) - (size - 1) / 2.0
     weight = np.hanning(size + 2)[1:-1]
     weight /= weight.sum()
     offset = pieces - np.vecdot(pieces, weight)[..., None]
     offset -= t * (np.vecdot(offset, weight * t) / np.vecdot(weight * t, t))[..., None]
-    return np.sqrt(8.0 * np.vecdot(np.square(offset, out=offset), weight))
+    return offset, weight
 
 
 def trend(width: np.ndarray, spacing_s: float, unsure: np.ndarray | float = 0.0) -> Trend:
