@@ -29,6 +29,7 @@ SHORT = {"duration": 0.3, "device.position": -0.0605}
 def test_the_front_door_imports_nothing_before_it_is_used_and_tells_the_nearest_of_a_wrong_name() -> None:
     code = "import sys, haploop.api; print({'numpy', 'pydantic', 'zmq', 'mcap', 'pint', 'difflib'} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
+    assert sorted(haploop.api.__all__) == dir(haploop.api)
     assert all(getattr(haploop.api, name) for name in haploop.api.__all__)
     with pytest.raises(AttributeError, match=r"no dissipat \(did you mean dissipate\?\)"):
         _ = haploop.api.dissipat

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
 
+from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.stability.judge import judge_scene
-from haploop.launch.stability.looks import LOOKS_S
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.changes import Borne, assumed_otherwise, changed_limits, changes, idealised
@@ -206,8 +206,8 @@ def advised_scene(subject: Subject, loop: Scene, found: Found) -> Scene | None:
 
 
 def _provisos(scene: Scene) -> tuple[str, ...]:
-    found = judge_scene(scene, installed_kinds(), looks_s=LOOKS_S, frictionless=True)
-    return tuple(found.entries()["stability"]["provisos"])
+    """Returns what a run of the advised scene says beside its word."""
+    return tuple(run_in_process(scene, installed_kinds()).get("stability", {}).get("provisos", ()))
 
 
 def _shown(
