@@ -57,14 +57,25 @@ def test_bars_of_energy_lie_left_of_zero_where_they_feed_and_right_where_they_ta
     expect(page.locator("#budget output").first).to_have_text("−250 µW")
 
 
-@IN_BOTH
-def test_two_clicks_measure_time_frequency_and_differences_and_a_third_ends_it(stand_in, page):
-    ramp = [0.01 * i / 400 for i in range(401)]
-    stand_in.show(snapshot(0.0, 2.0, table("position", 0.0, 0.005, ("x", "m", "position", ramp))))
+def ramp_from(start_s):
+    """Two seconds in which a position rises evenly to 10 mm."""
+    rows = [0.01 * i / 400 for i in range(401)]
+    return snapshot(start_s, start_s + 2.0, table("position", start_s, 0.005, ("x", "m", "position", rows)))
+
+
+def measured(stand_in, page):
+    """Shows a ramp and measures between its quarters; returns the box of the chart."""
+    stand_in.show(ramp_from(0.0))
     expect(page.locator("#position .legend")).to_contain_text("10.000")
     box = page.locator("#position .u-over").bounding_box()
     for part in (0.25, 0.75):
         page.mouse.click(box["x"] + box["width"] * part, box["y"] + 20)
+    return box
+
+
+@IN_BOTH
+def test_two_clicks_measure_time_frequency_and_differences_and_a_third_ends_it(stand_in, page):
+    box = measured(stand_in, page)
     expect(page.locator("#position .note")).to_have_text(re.compile(r"^Δ (0\.99|1\.00)\d* s, 1\.0\d Hz$"))
     expect(page.locator("#position .legend")).to_contain_text(re.compile(r"Δ (4\.9|5\.0)"))
     page.mouse.click(box["x"] + box["width"] * 0.5, box["y"] + 20)
@@ -72,16 +83,11 @@ def test_two_clicks_measure_time_frequency_and_differences_and_a_third_ends_it(s
 
 
 def test_what_was_measured_stays_when_its_marks_are_moved_out_of_sight(stand_in, page):
-    ramp = [0.01 * i / 400 for i in range(401)]
-    stand_in.show(snapshot(0.0, 2.0, table("position", 0.0, 0.005, ("x", "m", "position", ramp))))
-    expect(page.locator("#position .legend")).to_contain_text("10.000")
-    box = page.locator("#position .u-over").bounding_box()
-    for part in (0.25, 0.75):
-        page.mouse.click(box["x"] + box["width"] * part, box["y"] + 20)
+    measured(stand_in, page)
     expect(page.locator("#position .legend")).to_contain_text(re.compile(r"Δ (4\.9|5\.0)"))
     page.wait_for_timeout(300)  # texts come some times a second
     told = page.inner_text("#position .head")
-    stand_in.show(snapshot(3.0, 5.0, table("position", 3.0, 0.005, ("x", "m", "position", ramp))))
+    stand_in.show(ramp_from(3.0))
     stand_in.drawn()
     page.wait_for_timeout(200)
     assert page.inner_text("#position .head") == told
