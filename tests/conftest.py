@@ -8,12 +8,17 @@ import signal
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
+import typer.main
+import typer.testing
 from hypothesis import HealthCheck, settings
 
+from haploop.plant.where_it_pays import WhereItPays
 from helpers.live.launched import Launched, Run
 
 # The same examples every time: a test fails for what was changed, never by chance; the profile explore draws new ones.
@@ -25,6 +30,8 @@ settings.load_profile("haploop")
 # compile all of haploop anew, a third of the time of a short run.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+# Typer makes all commands of a program anew for every call, forty times as long as most calls take.
+typer.testing._get_command = cache(typer.main.get_command)  # pyright: ignore[reportPrivateUsage, reportPrivateImportUsage]
 # A shell has its background jobs ignore Ctrl-C, and what they start inherits that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -39,6 +46,20 @@ def live_runs_here(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="hl", dir="/tmp") as directory:
         monkeypatch.setenv("XDG_RUNTIME_DIR", directory)
         yield Path(directory)
+
+
+@pytest.fixture
+def machine_code() -> None:
+    """Has loops of machine code where they pay in a test that is not slow; to make them takes up to half a minute."""
+
+
+@pytest.fixture(autouse=True)
+def nothing_waits_for_a_compiler(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Keeps tests that are not slow to NumPy, which has the same bits, but for those with ``machine_code``."""
+    with ExitStack() as without:
+        if not request.node.get_closest_marker("slow") and "machine_code" not in request.fixturenames:
+            without.enter_context(WhereItPays.none())
+        yield
 
 
 @pytest.fixture

@@ -164,7 +164,7 @@ def test_where_several_would_compile_at_once_one_does_and_the_others_load_what_i
     assert found == [True]
 
 
-def test_without_numba_a_batch_is_booked_by_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_numba_a_batch_is_booked_by_numpy(monkeypatch: pytest.MonkeyPatch, machine_code: None) -> None:
     scenes = [pressed(wall={"position": -0.002, "stiffness": 300.0 + i}) for i in range(3)]
     monkeypatch.setattr(batch.LOOPS, "pays", 0)
     monkeypatch.setitem(sys.modules, "numba", None)
@@ -178,7 +178,7 @@ def test_without_numba_a_batch_is_booked_by_numpy(monkeypatch: pytest.MonkeyPatc
 
 
 def test_loops_are_loaded_once_enough_was_asked_of_a_process_and_no_sooner(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, machine_code: None
 ) -> None:
     (tmp_path / "loops_that_count.py").write_text("tried = []\ndef try_out(): tried.append(1)\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
@@ -191,7 +191,7 @@ def test_loops_are_loaded_once_enough_was_asked_of_a_process_and_no_sooner(
 
 
 def test_a_process_that_others_wait_for_loads_only_loops_that_were_made_before(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, machine_code: None
 ) -> None:
     module = "made = False\ndef is_made(): return made\ndef try_out(): assert made\n"
     (tmp_path / "loops_that_wait.py").write_text(module, encoding="utf-8")

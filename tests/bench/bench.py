@@ -64,7 +64,7 @@ def _realistic_us(
 
 
 def _first_tick_s() -> float:
-    """From the command line to the first tick: a run of one tick, less nothing."""
+    """From the command line until the summary of a run of one tick is there: to the first tick, and the log's end."""
     with tempfile.TemporaryDirectory() as folder:
         command = [
             sys.executable,
@@ -78,8 +78,12 @@ def _first_tick_s() -> float:
             "run.verdict=window",
         ]
         began = time.perf_counter()
-        subprocess.run([*command, "--out", f"{folder}/out"], check=True, capture_output=True)
-        return time.perf_counter() - began
+        command += ["--out", f"{folder}/out"]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
+            while not Path(folder, "out", "summary.json").exists():
+                assert run.poll() is None
+                time.sleep(0.002)
+            return time.perf_counter() - began
 
 
 ROWS: dict[str, tuple[Callable[[], float], str, str, float]] = {
@@ -100,7 +104,7 @@ ROWS: dict[str, tuple[Callable[[], float], str, str, float]] = {
         "plain loop",
         0.0,
     ),
-    "haploop run of one tick, start to end": (_first_tick_s, "s", "", 0.0),
+    "haploop run of one tick, to its summary": (_first_tick_s, "s", "", 0.0),
 }
 
 

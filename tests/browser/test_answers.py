@@ -37,6 +37,7 @@ def test_a_run_that_never_began_is_told_and_before_the_first_tick_no_loop_is_den
     assert page.locator("#energy .plot").evaluate("e => getComputedStyle(e).visibility") == "visible"
 
 
+@pytest.mark.slow
 def test_a_run_that_is_over_offers_nothing_live_and_says_whether_the_next_one_comes(stand_in, page):
     page.click("#freeze")
     expect(page.locator("#freeze")).to_have_text("Go live")
@@ -120,6 +121,7 @@ def test_no_verdict_of_steady_stands_alone_beside_what_moves_still(stand_in, pag
     expect(page.locator("#verdict use")).to_have_attribute("href", "#verdict-steady")
 
 
+@pytest.mark.slow
 def test_the_force_that_ripples_in_the_run_and_that_of_its_pushed_copies_are_told_apart(stand_in, page):
     window = {"window": {"force_ripple_N": 0.2}}
     stand_in.state(

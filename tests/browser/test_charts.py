@@ -29,7 +29,8 @@ def test_a_line_goes_through_its_values_and_is_broken_where_there_are_none(stand
         assert first - 0.03 <= expected <= last + 0.03
 
 
-@pytest.mark.parametrize("diverged", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("diverged", [True, False])
 def test_a_run_drawn_behind_that_diverged_leaves_the_axis_to_the_run_on_show(stand_in, page, diverged):
     ramp = [0.01 * i / (ROWS - 1) for i in range(ROWS)]
     step = 2.0 / (ROWS - 1)

@@ -16,6 +16,7 @@ KEYS = [
 ]
 
 
+@pytest.mark.slow
 def test_every_key_orders_what_the_help_says(stand_in, page):
     for key, expected in KEYS:
         assert order(stand_in, page, lambda what=key: page.keyboard.press(what)) == expected
@@ -59,6 +60,7 @@ def test_every_control_can_be_reached_by_tab(stand_in, page):
     assert wanted - reached == set()
 
 
+@pytest.mark.slow
 def test_the_help_names_every_key(page):
     page.keyboard.press("?")
     expect(page.locator("#keys")).to_be_visible()

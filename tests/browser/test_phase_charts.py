@@ -22,6 +22,7 @@ def test_without_wall_or_inertia_the_loops_say_that_there_is_none(stand_in, page
     expect(page.locator("#momentum .legend")).to_contain_text("unidirectional-inertia")
 
 
+@pytest.mark.slow
 def test_where_only_extremes_are_kept_no_wall_is_denied_and_no_line_swings_between_them(stand_in, page):
     """Intervals of 0.1 s between the same two extremes: a line through them would go up and down as nothing did."""
     rows = [(0.0, 0.01)[i % 2] for i in range(40)]

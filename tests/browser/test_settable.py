@@ -7,6 +7,7 @@ from helpers.live.browser import order
 from helpers.live.stand_in import OPTIONS
 
 
+@pytest.mark.slow
 def test_settable_numbers_show_their_present_values_lengths_in_mm_and_times_in_ms(page):
     shown = {key: page.input_value(f"[id='set-{key}']") for key in OPTIONS["settable"]}
     assert shown == {
@@ -28,6 +29,7 @@ def test_only_what_was_changed_is_set_and_a_number_in_mm_or_ms_goes_out_with_its
     expect(page.locator("#set-do")).to_be_disabled()
 
 
+@pytest.mark.slow
 def test_the_last_change_is_taken_back_by_one_click(stand_in, page):
     expect(page.locator("#undo")).to_be_hidden()
     stand_in.tell({"type": "events", "events": [{"tick": 500, "t_s": 0.5, "text": "set", "kind": "set"}]})

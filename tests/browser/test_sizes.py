@@ -153,6 +153,7 @@ def test_on_a_phone_fingers_find_their_targets(stand_in, open_page):
         assert page.locator(selector).bounding_box()["height"] >= 40, selector
 
 
+@pytest.mark.slow
 def test_on_a_phone_one_row_of_controls_floats_runs_have_the_whole_width_and_every_chart_its_times(stand_in, open_page):
     page = shown(stand_in, open_page, PHONE, "light", has_touch=True, is_mobile=True)
     page.evaluate("scrollTo(0, 1000)")

@@ -9,6 +9,7 @@ from helpers.live.stand_in import OPTIONS, RUNNING, TOKEN
 from oracles.snapshots import contact
 
 
+@pytest.mark.slow
 def test_every_order_carries_the_token_of_the_link(stand_in, page):
     assert order(stand_in, page, lambda: page.click("#pause")) == ("pause", {})
     assert stand_in.commands()[-1]["token"] == TOKEN
@@ -51,6 +52,7 @@ def test_a_paused_run_is_resumed_by_the_same_button_and_key(stand_in, page):
     assert order(stand_in, page, lambda: page.click("#pause"))[0] == "resume"
 
 
+@pytest.mark.slow
 def test_to_stop_is_asked_first_and_may_be_taken_back(stand_in, page):
     page.keyboard.press("x")
     expect(page.locator("#stopping")).to_be_visible()
@@ -86,6 +88,7 @@ def test_one_can_be_added_past_the_end_and_one_removed(stand_in, page):
     assert order(stand_in, page, lambda: page.click("#swap-do")) == ("swap", {"swap": {"kind": "none"}, "element": 0})
 
 
+@pytest.mark.slow
 def test_the_swap_form_follows_what_is_set_until_something_is_chosen_in_it(stand_in, page):
     def set_damping(value):
         element = {**OPTIONS["elements"][0], "damping": value}
@@ -241,6 +244,7 @@ def test_three_clicks_are_one_swap(stand_in, page):
     expect(page.locator("#swap-do")).to_be_disabled()
 
 
+@pytest.mark.slow
 def test_clicks_that_follow_the_answer_of_a_swap_are_no_second_one(stand_in, page):
     page.locator("#swap-do").evaluate("""async button => {
         for (let i = 0; i < 3; i++) {
@@ -253,6 +257,7 @@ def test_clicks_that_follow_the_answer_of_a_swap_are_no_second_one(stand_in, pag
     expect(page.locator("#swap-do")).to_be_enabled()  # for the next swap
 
 
+@pytest.mark.slow
 def test_the_form_of_a_run_without_elements_offers_the_first_kind_whatever_was_chosen_for_the_last_run(stand_in, page):
     page.select_option("#swap-kind", "unidirectional-inertia")
     page.select_option("#swap-acts", "always")

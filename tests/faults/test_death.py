@@ -44,6 +44,7 @@ def test_a_node_killed_in_mid_run_ends_the_run_is_named_with_the_last_common_tic
         assert not log.truncated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("role", first_and_slowly(*ROLES))
 def test_a_node_killed_as_it_starts_ends_the_run_and_is_named(role, running):
     run = running(sets=AT_REST)
@@ -54,6 +55,7 @@ def test_a_node_killed_as_it_starts_ends_the_run_and_is_named(role, running):
     assert common_tick(role, run.stderr) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("role", first_and_slowly(*ROLES))
 def test_a_node_killed_at_the_end_when_the_others_have_done_their_last_tick_is_named(role, running):
     run = running()

@@ -25,6 +25,7 @@ def joined(seat: Path, *options: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-I", str(CONTROLLER), *options, "--seat", str(seat)])
 
 
+@pytest.mark.slow
 def test_a_run_waits_for_an_external_controller_and_gives_the_same_bits(started: Started) -> None:
     own, run = started(node=None), started("--external", "controller", node=None)
     seat = seat_of(run)

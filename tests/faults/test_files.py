@@ -23,6 +23,7 @@ def test_a_disk_that_fills_ends_the_run_with_an_error_that_names_the_file_and_th
     assert same_bits(haploop.logger.read(run.out), undisturbed) >= 1000
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_ends_a_run_in_one_process_with_the_same_error(launched, tmp_path, undisturbed):
     out = tmp_path / "out"
     run = launched("run", str(SCENE), "--set", "duration=600", "--in-process", out=out, disk_bytes=LIMIT_BYTES)

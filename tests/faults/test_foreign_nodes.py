@@ -42,7 +42,7 @@ def test_a_foreign_controller_gives_the_bits_of_our_own_and_is_told_as_foreign(s
 @pytest.mark.parametrize(
     ("how", "words"),
     [
-        ("die", "was killed by SIGKILL; the last tick all nodes had done is"),
+        pytest.param("die", "was killed by SIGKILL; the last tick all nodes had done is", marks=pytest.mark.slow),
         pytest.param("exit", "ended with exit status 3; the last tick all nodes", marks=pytest.mark.slow),
         pytest.param("hang", f"has not answered for {BRIEF_S} s and was ended", marks=pytest.mark.slow),
         pytest.param("silent", "no tick was done, though all nodes speak", marks=pytest.mark.slow),

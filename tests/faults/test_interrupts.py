@@ -50,6 +50,7 @@ def test_the_first_signal_ends_a_paused_run_where_it_stands(running, undisturbed
     assert_stopped_in_order(run, summary, undisturbed)
 
 
+@pytest.mark.slow
 def test_a_signal_before_the_first_tick_ends_the_run_in_order_at_tick_0(running, undisturbed):
     run = running(sets=AT_REST)
     wait_for("the run", lambda: run.live)

@@ -77,6 +77,7 @@ def assert_rows(viewer: Viewer, log: Recording, first_tick: int) -> None:
         assert {type(value) for sample in parser.samples for value in sample.values()} == {float}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pace", first_and_slowly({}, {"pace": 2.0}), ids=["free", "at a pace"])
 def test_every_sample_of_a_run_reaches_plotjuggler_bit_for_bit(pace, tmp_path, capsys):
     """From the tick on at which the node joined; an element that is added on the way makes no gap."""

@@ -85,10 +85,10 @@ def test_a_force_that_is_no_finite_number_fails_a_run_in_one_process_too(launche
 
 @pytest.mark.parametrize(
     ("statement", "reason"),
-    [
-        ("1 / 0", "ZeroDivisionError: division by zero"),
+    first_and_slowly(
         ("return 'much'", "TypeError: it returned 'much', which is text"),
-    ],
+        ("1 / 0", "ZeroDivisionError: division by zero"),
+    ),
 )
 @pytest.mark.parametrize("options", first_and_slowly([], ["--in-process"]))
 def test_a_force_that_raises_or_is_no_number_fails_the_run_and_names_element_and_tick(
@@ -171,6 +171,7 @@ def test_of_a_force_that_never_returns_from_compiled_code_node_line_and_deadline
     assert re.search(r'File ".*/plugins/brake-.*", line \d+ in force', run.stderr)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("statement", "reason"),
     first_and_slowly(

@@ -102,6 +102,7 @@ def test_the_last_lines_of_a_run_that_fails_are_shown_however_much_came_before(r
     assert run.stderr.count("flood") < 80
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", first_and_slowly("everywhere", "binary", "raw"))
 def test_a_run_in_one_process_keeps_its_answer_to_itself_too(kind, tmp_path, silent):
     plugin = write_plugin(tmp_path, *(() if kind == "raw" else KINDS[kind]))

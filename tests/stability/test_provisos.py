@@ -26,6 +26,7 @@ def with_friction_asked(of) -> Finding:
     return judge(ended(of), LOOKS_S, frictionless=True)
 
 
+@pytest.mark.slow
 def test_a_wall_beyond_its_limit_that_friction_holds_is_told_apart_from_one_that_rests_without():
     """The first is beyond rho(M) = 1, the second far below."""
     loop = drawn(7026)

@@ -17,7 +17,7 @@ from helpers.scenes.effect_tables import slowly
 from helpers.scenes.unseen_loops import KINDS, drawn
 
 
-@pytest.mark.parametrize("kind", [0, 3, 5, *slowly([1, 2, 4])], ids=KINDS.__getitem__)
+@pytest.mark.parametrize("kind", [5, *slowly(range(5))], ids=KINDS.__getitem__)
 def test_a_loop_that_grows_is_never_called_steady(kind):
     """Two loops of each kind; hundreds are slow."""
     drawn_loops = filter(None, map(drawn, itertools.count(kind, len(KINDS))))

@@ -65,7 +65,7 @@ def unexplained(flows: dict[str, np.ndarray], true: np.ndarray, wrong: str = "")
 # Motions made by hand
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", [*[*CASES][::2], *slowly([*CASES][1::2])])
 def test_every_heat_and_work_of_every_step_is_its_integral_along_a_motion_made_another_way(case):
     flows, _ = booked(case)
     energies = made(case)[1].energies

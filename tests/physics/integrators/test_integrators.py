@@ -77,7 +77,7 @@ def test_the_error_falls_with_the_step_by_the_order_of_the_method(method, name):
 
 @pytest.mark.parametrize("name", SMOOTH)
 @pytest.mark.parametrize(("method", "most"), [("exact", 1e-11), ("dop853", 1e-8)])
-@pytest.mark.parametrize("plant_rate", [1000, 8000])
+@pytest.mark.parametrize("plant_rate", first_and_slowly(1000, 8000))
 def test_what_has_no_step_of_its_own_is_right_at_every_plant_rate(plant_rate, method, most, name):
     assert error(method, plant_rate, name) <= most
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from haploop.logger.summary import Summary
+from typing import TYPE_CHECKING
+
 from haploop.tools.render.units import amount
+
+if TYPE_CHECKING:
+    from haploop.logger.summary import Summary
 
 # Verdicts of a loop that swings.
 SWINGS = ("limit-cycle", "growing", "diverged")

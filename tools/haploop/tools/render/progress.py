@@ -42,8 +42,9 @@ class ProgressLine:
         self._began: tuple[float, float] | None = None
 
     def __enter__(self) -> Self:
-        self._console = self._console or console(stderr=True)
-        if self._console.is_terminal:
+        if not self._console and sys.stderr and sys.stderr.isatty():
+            self._console = console(stderr=True)
+        if self._console and self._console.is_terminal:
             from rich.live import Live
 
             self._live = Live(console=self._console, auto_refresh=False, transient=True)
