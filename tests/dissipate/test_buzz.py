@@ -51,15 +51,15 @@ def test_a_buzz_is_told_at_its_frequency_on_a_hands_motion_noise_and_counts(
     assert found.word() == "buzzes"
     assert buzz is not None
     assert abs(buzz.frequency_Hz - frequency_Hz) < 0.5 * buzz.within_Hz
-    assert buzz.width_m == pytest.approx(4e-4, rel=0.15)
+    assert buzz.width_m == pytest.approx(4e-4, rel=0.03)
     assert buzz.stretches == ((0.0, pytest.approx(S[-1], abs=0.125)),)
 
 
 @pytest.mark.parametrize("begins_s", [1.0, 1.3, 2.0, 2.4])
-def test_a_buzz_begins_when_it_does_within_half_a_second(begins_s: float) -> None:
+def test_a_buzz_begins_when_it_does_within_a_fifth_of_a_second(begins_s: float) -> None:
     buzz = finder(counted(swing(31.0, 2.6e-4) * (begins_s < S) - 2e-3 * np.minimum(S, 1.0))).buzz()
     assert buzz is not None
-    assert buzz.stretches[0][0] == pytest.approx(begins_s, abs=0.5)
+    assert buzz.stretches[0][0] == pytest.approx(begins_s, abs=0.2)
 
 
 def test_a_buzz_that_pauses_is_told_with_all_its_stretches_also_those_that_do_not_last_alone(tmp_path: Path) -> None:
@@ -89,7 +89,7 @@ def test_a_gap_in_a_recording_does_not_end_its_buzz() -> None:
 def test_a_buzz_whose_frequency_moves_is_told_from_its_least_to_its_greatest(tmp_path: Path) -> None:
     x_m = 5e-4 * np.sin(2.0 * np.pi * (26.0 * S + 2.0 * S**2))
     said = shown(make_report(outcome(write(tmp_path / "sweep.csv", {"t": S, "x": x_m}))))
-    assert "it swings at 27 to 41 Hz, 1.0" in said
+    assert "it swings at 27 to 41 Hz, 993 µm" in said
     assert "give or take" not in said
 
 
@@ -146,7 +146,7 @@ def test_a_swing_left_out_near_a_multiple_of_a_slower_one_is_told_beside_that_no
     path = write(tmp_path / "beside.csv", {"t": S, "x": swing(12.33, 5e-4) + swing(37.0, 1e-4)})
     found = outcome(path)
     assert found.buzz is None
-    assert "A swing at 37.0 Hz, 208 µm peak to peak, was left out: near 3 times 12.4 Hz" in shown(
+    assert "A swing at 37.0 Hz, 200 µm peak to peak, was left out: near 3 times 12.3 Hz" in shown(
         make_report(found), 400
     )
     assert found.as_data()["left_out"]["frequency_Hz"] == pytest.approx(37.0, abs=0.1)

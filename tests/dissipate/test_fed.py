@@ -52,7 +52,7 @@ def test_the_power_given_to_a_swing_is_that_of_a_late_spring_in_closed_form(
     half = W * 0.5e-3
     power = 0.5 * K * SWING_M**2 * W * np.sin(W * late_s + half) * np.sin(half) / half
     assert found.buzz
-    assert found.buzz.fed_W == pytest.approx(power, rel=0.05 if not counts_m else 0.1)
+    assert found.buzz.fed_W == pytest.approx(power, rel=0.02 if not counts_m else 0.1)
     assert found.buzz.fed_J == pytest.approx(power * 3.0, rel=0.15)
     assert FEEDS in shown(make_report(found), 400)
 
@@ -102,7 +102,7 @@ def test_what_a_log_says_of_a_swing_that_lasts_is_the_slope_of_its_own_book(tmp_
     t, _, _, true_J, _ = found.trace.lines()
     late = t > 1.0
     slope_W = -float(np.polyfit(t[late], true_J[late], 1)[0])
-    assert found.buzz.fed_W == pytest.approx(slope_W, rel=0.1)
+    assert found.buzz.fed_W == pytest.approx(slope_W, rel=0.03)
 
 
 def test_where_the_sign_of_the_force_is_in_doubt_so_is_who_feeds_the_swing(tmp_path: Path) -> None:

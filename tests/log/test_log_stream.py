@@ -175,7 +175,7 @@ def test_a_table_gives_quantities_and_a_data_frame_with_units(run: Path) -> None
     assert same_bits(table.quantity("v").to("mm/s").magnitude, table["v"] * 1e3)
     assert table.quantity("force").units == "newton"
     frame = table.frame()
-    assert frame.index.name == "timestamp"
+    assert frame.index.name == "time (s)", "the label of the axis of a plot"
     assert same_bits(frame.index.to_numpy(), table["timestamp"])
     assert list(frame.columns) == ["t", "x", "v", "force"]
     assert all(same_bits(frame[name].to_numpy(), table[name]) for name in frame.columns)

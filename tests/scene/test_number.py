@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic_core import PydanticCustomError
 
-from haploop.launch.scene.number import _UNITS, _exact, is_exotic, si
+from haploop.launch.scene.number import si
+from haploop.launch.scene.units import _UNITS, _exact, is_exotic
 from helpers.scenes.least import mistakes, scene
 
 

@@ -9,22 +9,9 @@ from haploop.launch.scene.bundled import bundled_folder
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.scene.reading.lines import outline
-from haploop.protocol.scene.hand_force import Constant, Sine, Trace
+from haploop.protocol.scene.hand_force import Constant, Sine
 from haploop.protocol.scene.scene import Device, Hand, Wall
 from helpers.scenes.least import LEAST_TOML, file_mistakes
-
-
-@pytest.fixture
-def files(tmp_path, monkeypatch):
-    """Write files by name and work in their directory."""
-    monkeypatch.chdir(tmp_path)
-
-    def write(**texts):
-        for name, text in texts.items():
-            (tmp_path / f"{name}.toml").write_text(text)
-        return tmp_path / f"{next(iter(texts))}.toml"
-
-    return write
 
 
 def test_the_title_is_the_name_of_the_file_unless_given(files):
@@ -218,60 +205,10 @@ def test_a_byte_order_mark_is_no_mistake(tmp_path):
     assert load(tmp_path / "x.toml").duration == 1.0
 
 
-def test_a_recorded_force_is_read_in_whole_relative_to_the_file_that_names_it(files, tmp_path):
-    (tmp_path / "devices").mkdir()
-    (tmp_path / "devices/push.csv").write_text("time,force\n0.0,0.0\n\n0.5,-1.0\n")
-    (tmp_path / "devices/base.toml").write_text(LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\n')
-    scene = load(files(top='extends = "devices/base.toml"\n'))
-    assert scene.hand == Hand(force=Trace(time=(0.0, 0.5), force=(0.0, -1.0)))
-
-
-@pytest.mark.parametrize(
-    ("csv", "sentence"),
-    [
-        ("t,f\n0,1\n0,2\n", "Line 3: The times must increase, but 0 s follows 0 s."),
-        ("0,1\n1,x\n", "Line 2 must be a time in s and a force in N, but is '1,x'."),
-        ("0,1\n1\n", "Line 2 must be a time in s and a force in N, but is '1'."),
-        ("0,1,2\n", "Line 1 must be a time in s and a force in N, but is '0,1,2'."),
-        ("0,nan\n", "Line 1: Time and force must be finite numbers."),
-        ("t,f\n", "There must be at least one sample."),
-        (None, "The recording cannot be read: No such file or directory."),
-    ],
-)
-def test_a_recording_that_cannot_be_used_says_which_line(files, tmp_path, csv, sentence):
-    if csv is not None:
-        (tmp_path / "push.csv").write_text(csv)
-    path = files(top=LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\n')
-    assert file_mistakes(path) == [f'top.toml:7: hand.force.file is "push.csv". {sentence}']
-
-
-def test_a_trace_has_a_file_or_samples_but_not_both(files):
-    path = files(top=LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\ntime = [0.0, 1.0]\n')
-    [mistake] = file_mistakes(path)
-    assert mistake.endswith("A trace has either a file or the lists time and force.")
-
-
 def test_the_error_is_a_value_error_with_one_line_a_mistake(files):
     with pytest.raises(SceneError) as error:
         load(files(top="seed = -1\n"))
     assert len(str(error.value).splitlines()) == len(error.value.mistakes) == 3
-
-
-@pytest.mark.parametrize(
-    ("csv", "times", "forces"),
-    [
-        ("t (ms), F [mN]\n0,0\n500,-1500\n", (0.0, 0.5), (0.0, -1.5)),
-        ("time,force (N)\n0,0\n500,-1500\n", (0.0, 500.0), (0.0, -1500.0)),
-    ],
-)
-def test_units_in_the_header_of_a_recorded_force_are_read(files, tmp_path, csv, times, forces):
-    (tmp_path / "push.csv").write_text(csv)
-    path = files(top=LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\n')
-    assert load(path).hand == Hand(force=Trace(time=times, force=forces))
-    (tmp_path / "push.csv").write_text(csv.replace("F [mN]", "m (g)").replace("force (N)", "m (kg)"))
-    [mistake] = file_mistakes(path)
-    assert "Line 1, the header of time and force:" in mistake
-    assert "is a mass, but" in mistake
 
 
 COUNTED = LEAST_TOML + '[encoder]\nbits = 14\nrange = "0.2 m"\n'

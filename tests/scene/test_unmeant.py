@@ -22,6 +22,7 @@ PUSHED = {"mass": 0.1, "damping": 2.0, "stiffness": 100.0, "force": {"kind": "ra
 FORCE = {"kind": "constant"}
 HELD = {"mass": 0.1, "damping": 2.0, "stiffness": 100.0, "grip": {"stiffness": 500.0, "damping": 1.0}}
 HELD["force"] = {**FORCE, "value": -0.2}
+THROWN = {"mass": 0.05, "damping": 0.1, "velocity": -0.3}
 # Tables that break each rule, and a neighbour of them that keeps it; what the sentence must hold.
 CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"duration": 3, "clock": {"control_rate": 10_000, "round_trip_delay": 0.2}},
@@ -31,6 +32,10 @@ CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
      "Nothing moves the device"),
     ({"hand": PUSHED, "friction": {"kinetic": 80.0}}, {"hand": PUSHED, "friction": {"kinetic": 8.0}},
      "Dry friction of 80 N holds the device, which the hand pushes by 10 N at most"),
+    ({"hand": HELD | {"force": {**FORCE, "value": -1.5e-3}}, "friction": {"kinetic": 0.048}, "device": THROWN},
+     {"hand": HELD, "friction": {"kinetic": 0.048}, "device": THROWN}, "hardly anything beside"),
+    ({"hand": HELD | {"force": {**FORCE, "value": -1.5e-3}}, "wall": WALL, "device": THROWN},
+     {"hand": HELD, "wall": {**WALL, "position": -5e-3}, "device": THROWN}, "touches it in a swing at most"),
     ({"hand": PUSHED, "wall": {"position": -60, "stiffness": 150}},
      {"hand": PUSHED, "wall": {"position": -0.06, "stiffness": 150}}, "The wall is at -60 m"),
     ({"hand": PUSHED | {"stiffness": 2000.0, "damping": 9.0}, "wall": WALL}, {"hand": PUSHED, "wall": WALL},

@@ -15,7 +15,9 @@ from haploop.tools.cli.app import app
 from haploop.tools.cli.runs_beside import difference_table
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.difference import Parting, difference, unlike_keys
-from haploop.tools.figure.overlay import MOST_RUNS, labels, make_overlay
+from haploop.tools.figure.overlay import MOST_RUNS, make_overlay
+from haploop.tools.figure.run_labels import labels
+from haploop.tools.figure.run_names import run_names
 from helpers.shown import artists, row, shown
 
 PNG = b"\x89PNG"
@@ -72,6 +74,52 @@ def test_runs_part_at_the_first_tick_in_contact_after_their_only_event(runs):
     assert found.results["trajectory_sha256"][0] != found.results["trajectory_sha256"][1]
 
 
+def test_a_title_that_both_runs_have_is_no_row_of_what_they_differ_in(runs):
+    told = shown(difference_table(difference(*data(runs, "a", "bare"))), 140)
+    assert not any(line.strip().startswith("title") for line in told.splitlines())
+    assert row(shown(difference_table(difference(*data(runs, "a", "again"))), 200), "title")[1] == "again"
+
+
+def test_an_event_that_a_run_has_not_is_told_as_one_difference_and_that_one_has_in_words(runs):
+    given = data(runs, "a", "swapped")
+    assert [label.rpartition(" (")[2] for label in labels(given, "ab")] == [
+        "without event 0)",
+        "at 1 s set wall.stiffness = 90 N/m)",
+    ]
+
+
+def test_the_heads_of_diff_are_the_directories_however_they_are_named_and_reached(runs, monkeypatch):
+    twice = haploop("diff", runs["a"], runs["a"]).stdout.split("\n", 2)[1].split("  ")
+    assert [*filter(None, map(str.strip, twice))] == ["a", "a (2)"]
+    odd = runs["a"].parent / "[bold]x"
+    odd.symlink_to(runs["again"])
+    assert run_names([runs["a"] / ".." / "a", odd]) == ["a", "[bold]x"]
+    monkeypatch.chdir(runs["a"])
+    assert haploop("diff", ".", runs["bare"]).stdout.split("\n", 2)[1].split() == ["a", "bare"]
+    table = difference_table(replace(difference(*data(runs, "a", "again")), runs=("[bold]x", "y")))
+    assert "[bold]x" in shown(table, 140), "brackets are no markup"
+
+
+@pytest.mark.parametrize(
+    ("paths", "names"),
+    [
+        (["one/run", "two/run", "three/other"], ["one/run", "two/run", "three/other"]),
+        (["x/one/run", "y/one/run"], ["x/one/run", "y/one/run"]),
+        (["a", "b", "a", "a"], ["a", "b", "a (2)", "a (3)"]),
+        (
+            ["2026-11-26_premium15_cable_of_two_metres_K1", "2026-11-26_premium15_cable_of_two_metres_K2", "a"],
+            ["…K1", "…K2", "a"],
+        ),
+        (
+            ["l" * 30 + "1" + "r" * 30, "l" * 30 + "2" + "r" * 30],
+            ["l" * 30 + "1" + "r" * 30, "l" * 30 + "2" + "r" * 30],
+        ),
+    ],
+)
+def test_a_run_is_named_by_as_much_of_its_path_as_tells_it_apart(paths, names):
+    assert run_names([Path("/") / path for path in paths]) == names
+
+
 def test_of_a_killed_run_the_ticks_that_are_there_are_compared_and_no_energies(runs):
     found = difference(*data(runs, "a", "killed"))
     assert found.parting is None
@@ -106,20 +154,23 @@ def test_diff_tells_it_as_a_table_and_as_one_json_object(runs):
 
 def test_an_overlay_draws_every_run_with_its_name_and_what_differs(runs):
     given = data(runs, "a", "swapped", "killed", "slow")
-    figure = make_overlay(given)
+    names = ["a", "swapped", "killed", "slow"]
+    figure = make_overlay(given, names)
     assert len(artists(figure, "position")) == 2 * len(given), "the close view is where the killed one is, too"
     told = [text.get_text() for text in artists(figure, "label")]
     # What has no room is cut off.
-    assert all(full.startswith(seen.rstrip(" …")) for full, seen in zip(labels(given), told, strict=True))
+    assert all(full.startswith(seen.rstrip(" …")) for full, seen in zip(labels(given, names), told, strict=True))
+    assert all(label.startswith(f"{name}: ") for label, name in zip(told, names, strict=True))
     assert "clock.control_rate 500 Hz" in told[3]
-    assert not any("–" in label for label in labels(given)), "a key that a run has not is not told of it"
-    assert labels(data(runs, "a", "a")) == [given[0].scene.title] * 2
+    assert not any("–" in label for label in labels(given, names)), "a key that a run has not is not told of it"
+    assert labels(data(runs, "a", "a"), ["a", "a (2)"]) == ["a", "a (2)"], "nothing differs but the name"
     with_one, without = data(runs, "a", "bare")
-    assert labels([with_one, without]) == [
-        "with unidirectional-inertia (mass 0.01 kg)",
-        "without unidirectional-inertia",
+    assert labels([with_one, without], ["a", "bare"]) == [
+        "a: with unidirectional-inertia (mass 0.01 kg)",
+        "bare: without unidirectional-inertia",
     ]
-    assert [text.get_text() for text in artists(make_overlay([with_one, without]), "title")] == [without.scene.title]
+    titles = artists(make_overlay([with_one, without], ["a", "bare"]), "title")
+    assert [text.get_text() for text in titles] == [without.scene.title]
     beside = difference(with_one, without).energies_J
     assert None not in beside["together"], "of one book, that is all of it"
     assert beside["together"][1] == beside["wall"][1]
@@ -133,7 +184,9 @@ def test_the_close_view_of_runs_of_unlike_length_is_where_all_of_them_are(runs, 
     short = made(tmp_path / "short", "duration=1.2")
     given = [RunData.from_directory(short), *data(runs, "a")]
     assert given[1].close_s()[1] > given[0].span_s[1], "the last of the longer is beyond the end of the shorter"
-    closer = next(ax for ax in make_overlay(given).get_axes() if ax.get_title(loc="left") == "Position, close view")
+    closer = next(
+        ax for ax in make_overlay(given, "ab").get_axes() if ax.get_title(loc="left") == "Position, close view"
+    )
     assert closer.get_xlim()[1] <= given[0].span_s[1] + 0.01
     assert len(artists(closer, "position")) == 2
 
@@ -147,7 +200,7 @@ def test_beside_a_verdict_its_provisos_are_told_in_full_in_overlay_and_table(run
     held, other = data(runs, "a", "swapped")
     found = {"stability": {"provisos": ["only friction holds it"]}}
     held = replace(held, every_step=False, summary=held.summary | found)
-    numbers = [text.get_text() for text in artists(make_overlay([held, other]), "numbers")]
+    numbers = [text.get_text() for text in artists(make_overlay([held, other], "ab"), "numbers")]
     assert numbers[0].startswith("only friction holds it; oscillation")
     assert [text.endswith("; position as measured") for text in numbers] == [True, False]
     table = shown(difference_table(difference(held, other)), 140)
@@ -161,4 +214,4 @@ def test_plot_of_several_runs_writes_one_figure_and_refuses_what_it_cannot_draw(
     assert (tmp_path / "both.png").read_bytes().startswith(PNG)
     many = haploop("plot", *[runs["a"]] * (MOST_RUNS + 1))
     assert many.exit_code == 2
-    assert "At most 6 runs can be told apart in one figure, but 7 were given." in many.stderr
+    assert "At most 6 runs can be told apart in one figure, but 7 were given; draw fewer." in many.stderr

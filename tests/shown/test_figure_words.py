@@ -39,6 +39,20 @@ def test_events_are_marked_at_their_times_and_named(runs: dict[str, Path]) -> No
     assert "3 at 1.1 s: element 0 is removed" in " ".join(event_lines(data))
 
 
+def test_the_first_note_on_a_scene_stands_below_its_figure_with_how_many_there_are(runs: dict[str, Path]) -> None:
+    data = RunData.from_directory(runs["swap"])
+    [below] = artists(make_figure(data), "events")
+    assert "note" not in below.get_text()
+    assert data.scene.wall
+    assert data.scene.hand
+    soft = replace(data.scene, wall=replace(data.scene.wall, stiffness=15.0))
+    [below] = artists(make_figure(replace(data, scene=soft)), "events")
+    assert below.get_text().startswith("A note on its scene: wall.stiffness is 15 N/m; is that the unit")
+    more = replace(soft, duration=1e6)
+    [below] = artists(make_figure(replace(data, scene=more)), "events")
+    assert below.get_text().startswith("2 notes on its scene, of which the first: wall.stiffness is 15 N/m")
+
+
 def test_what_events_set_is_told_with_the_unit_that_it_has_at_that_time() -> None:
     before = scene(wall=WALL, dissipation=[{"kind": "damping", "damping": 1.0}])
     inertia = {"kind": "unidirectional-inertia", "mass": 0.002}

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from haploop.controller.dissipation import Element, Motion, registry
+from haploop.launch.plan.meant.rule import Note
 from haploop.launch.runs.start import prepare, run
 from haploop.protocol.quantity import Quantity
 from haploop.tools.render.cause import cause
@@ -50,6 +51,23 @@ def test_the_summary_table_holds_every_book_and_the_residual(swap: dict[str, Any
     share = f"residual, {energy['residual_J'] / energy['moved_J']:.1e} of what moved"
     assert row(text, share) == [amount(energy["residual_J"], "J")]
     assert max(map(len, text.splitlines())) <= width
+
+
+def test_the_report_ends_with_the_verdict_and_the_first_of_the_notes_and_without_notes_with_its_books(
+    swap: dict[str, Any],
+) -> None:
+    two = [Note("The wall is soft.", "wall"), Note("The run is long.", "duration")]
+    ends = [shown(summary_table(swap, two[:count]), 200).strip().splitlines()[-1] for count in (1, 2)]
+    word = swap["verdict"]
+    assert ends[0] == f"{word}  A note on its scene: The wall is soft."
+    assert ends[1] == f"{word}  2 notes on its scene, of which the first: The wall is soft."
+    assert shown(summary_table(swap), 200) in shown(summary_table(swap, two), 200), "all else is as it was"
+
+
+def test_why_there_is_no_contact_stands_at_the_verdict_of_a_run_without(swap: dict[str, Any]) -> None:
+    note = Note("The wall is never reached.", "wall", keeps_off=True)
+    assert shown(summary_table({**swap, "verdict": "no-contact"}, [note]), 200).count("never reached") == 2
+    assert shown(summary_table(swap, [note]), 200).count("never reached") == 1
 
 
 def test_the_summary_table_begins_with_the_verdict_and_what_was_seen(swap: dict[str, Any]) -> None:

@@ -12,7 +12,7 @@ from haploop.launch.spec import RunFailed
 from haploop.launch.stability.decide import Finding
 from haploop.logger import read
 from haploop.logger.summary import read as read_summary
-from haploop.tools.cli.view import LiveRuns
+from haploop.tools.cli.live_runs import LiveRuns
 from haploop.view.receive.run_session import RunSession
 from helpers.live.browsing import site, to_its_end
 from helpers.live.followed import follow, same, whole

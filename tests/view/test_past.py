@@ -10,7 +10,7 @@ import pytest
 
 from haploop.launch import load, run
 from haploop.launch.runs.run_files import recorded_scene
-from haploop.tools.cli.view import LiveRuns
+from haploop.tools.cli.live_runs import LiveRuns
 from haploop.view.draw.messages import event_lines, state
 from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.receive.past_session import PastSession

@@ -12,7 +12,7 @@ from haploop.logger.log.writer import Log
 from haploop.protocol.changes import Change, changes_of, refusal, spans
 from haploop.protocol.scene.scene import ElementTable, Wall
 from haploop.protocol.ticks import Timebase
-from haploop.tools.cli.view import LiveRuns
+from haploop.tools.cli.live_runs import LiveRuns
 from haploop.view import viewer
 from haploop.view.draw.messages import event_lines
 from haploop.view.draw.snapshot import Viewport, snapshot

@@ -13,7 +13,7 @@ from typing import Any
 import aiohttp
 import numpy as np
 
-from haploop.tools.cli.view import LiveRuns
+from haploop.tools.cli.live_runs import LiveRuns
 from haploop.view.receive.runs import CommandFailed, Runs
 from haploop.view.serve.guard import Guard
 from haploop.view.serve.server import listen, serve

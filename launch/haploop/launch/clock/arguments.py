@@ -7,7 +7,7 @@ from inspect import signature
 from typing import Any
 
 from haploop.launch.clock.clock import ClockError
-from haploop.launch.scene.number import is_exotic
+from haploop.launch.scene.units import is_exotic
 from haploop.protocol.transport.wire import Message
 
 # What one command may carry, so that none holds time up: keys and values, tables in each other, letters of a text.

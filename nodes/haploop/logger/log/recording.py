@@ -49,7 +49,9 @@ class Table(dict[str, Floats]):
         return pint.get_application_registry().Quantity(self[name], self.units[name])
 
     def frame(self) -> pandas.DataFrame:
-        """Returns the columns as a data frame indexed by ``timestamp`` (s), with ``frame.attrs["units"]`` by name.
+        """Returns the columns as a data frame, with ``frame.attrs["units"]`` by name.
+
+        Its index is the column ``timestamp``, named ``time (s)``, as which pandas labels the axis of a plot.
 
         Raises:
             ImportError: pandas is missing.
@@ -59,7 +61,7 @@ class Table(dict[str, Floats]):
         except ImportError as error:
             raise ImportError("Data frames need pandas; install it with: pip install 'haploop[pandas]'") from error
         frame = pandas.DataFrame(dict(self))
-        frame = frame.set_index(TIMESTAMP) if TIMESTAMP in self else frame
+        frame = frame.set_index(TIMESTAMP).rename_axis("time (s)") if TIMESTAMP in self else frame
         frame.attrs["units"] = dict(self.units)
         return frame
 

@@ -47,9 +47,11 @@ def amplitudes(samples: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray
 def main_line(samples: np.ndarray, rate: float, above_Hz: float = 0.0) -> Line | None:
     """Returns the line that stands out of the spectrum of samples, shape (count,); None where none does.
 
-    Its frequency and height are those of the parabola through the logarithms of the three highest neighbours. None too
-    where fewer than three periods were seen, for which a frequency is a guess. Of what is no faster than ``above_Hz``
-    nothing counts, nor what leaks from there: lower beside it than at its own place it is no line.
+    Under a window of Hann a sine that lies d lines beside the highest, of height h, has neighbours of
+    h (1 - d) / (2 + d) and h (1 + d) / (2 - d), and the amplitude h pi d (1 - d^2) / sin(pi d): its frequency and
+    height follow from the three without a bias, but for what leaks from other lines. None too where fewer than three
+    periods were seen, for which a frequency is a guess. Of what is no faster than ``above_Hz`` nothing counts, nor what
+    leaks from there: lower beside it than at its own place it is no line.
     """
     if len(samples) < _FEWEST or not np.isfinite(samples).all():
         return None
@@ -62,11 +64,9 @@ def main_line(samples: np.ndarray, rate: float, above_Hz: float = 0.0) -> Line |
     share = float(power[first:end].sum() / power.sum())
     if share < _STANDS_OUT:
         return None
-    offset, top = 0.0, height[peak]
+    offset = 0.0
     if peak + 1 < len(height):
-        low, mid, high = np.log(np.maximum(height[peak - 1 : peak + 2], 1e-300))
-        bend = low - 2.0 * mid + high
-        if bend < 0.0:
-            offset = 0.5 * (low - high) / bend
-            top = np.exp(mid - 0.25 * (low - high) * offset)
+        low, mid, high = height[peak - 1 : peak + 2]
+        offset = 2.0 * (high - low) / (low + 2.0 * mid + high)
+    top = height[peak] * (1.0 - offset**2) / np.sinc(offset)
     return Line(float(at[peak] + offset * (at[1] - at[0])), float(2.0 * top), share)

@@ -131,7 +131,7 @@ def run(
         if json:
             print_json({**summary, "directory": str(prepared.out), "notes": noted})
         else:
-            print_summary(summary, [note for note in noted if note.keeps_off])
+            print_summary(summary, noted)
             print(prepared.out)
         if summary["ended"] == "failed":
             leave(f"The run failed: {summary['why']}.", FAILED)

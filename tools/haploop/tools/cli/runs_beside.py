@@ -89,8 +89,9 @@ def difference_table(found: Difference) -> RenderableType:
     from haploop.tools.render.units import amount
 
     table = make_table("", *found.runs, unbroken=("",))
-    table.add_row("title", *(Text(name, "bold") for name in found.names))
-    table.add_section()
+    if found.names[0] != found.names[1]:
+        table.add_row("title", *(Text(name, "bold") for name in found.names))
+        table.add_section()
     for key, pair in found.scene.items():
         units = (f" {found.units[key]}" if isinstance(value, int | float) else "" for value in pair)
         told = [f"{scene_value(value)}{unit}" for value, unit in zip(pair, units, strict=True)]

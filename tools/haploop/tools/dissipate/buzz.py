@@ -8,13 +8,14 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from haploop.launch.stability.traces import is_felt
+from haploop.tools.dissipate.fed import LEAST_FED, fed_W
 from haploop.tools.dissipate.samples import Floats, Samples
 from haploop.view.look.spectrum import Line, main_line
 
 # Slower swings are a hand's: voluntary ones end at some 8 Hz, tremor at 12 Hz.
 ABOVE_HZ = 15.0
 # The spectrum is that of windows so long, a quarter of it apart.
-_WINDOW_S = 0.5
+_WINDOW_S, _HOPS = 0.5, 4
 _RESOLVED_HZ = 1.0 / _WINDOW_S
 # A swing at one frequency has so much of the variance of all that is faster than ``ABOVE_HZ``.
 _SHARE = 0.8
@@ -28,10 +29,9 @@ _OVERTONE, _APART_HZ, _CLOSE_HZ = 3.5, 0.3, 2.5
 # Samples a second below which noise has too few lines for one to stand out.
 LEAST_RATE_HZ = 200.0
 
-# The first window that a swing fills which began within the first, by number.
-_FULL = 3
-# A force gives to the swing, or takes, from so much on of what it would at most.
-LEAST_FED = 0.01
+# The first window that a swing fills which began within the first, by number; one before it is left out where it is
+# less than ``_KEPT`` as wide. Of those left the first and the last may be empty for about a quarter; the third is full.
+_FULL, _THIRD = _HOPS - 1, 2
 
 Word = Literal["buzzes", "none seen", "cannot say"]
 
@@ -43,10 +43,12 @@ class Buzz:
     Attributes:
         frequency_Hz, within_Hz: median of the windows', and half of what a window resolves.
         least_Hz, most_Hz: of the windows.
-        stretches: (from, to) of each, half a second at most too early or late, s.
-        width_m: of the widest window, peak to peak.
-        first_m, last_m: widths half a second after it began, and of the last window.
-        fed_W: mean power that a recorded force gave to the swing; negative where it took; None where none was recorded.
+        stretches: (from, to) of each, a fifth of a second at most too early or late, s.
+        width_m: of the widest window, peak to peak, of the sine at its frequency: to 1 % and a tenth of a count beside
+            a drift, to 3 % beside a hand's motion fifteen times as wide. Overtones may add some percent.
+        first_m, last_m: widths of the third window, which it fills, and of the last.
+        fed_W: mean power that a recorded force gave to the swing with its overtones, where it fills a window; negative
+            where it took; None where none was recorded.
         moved_W: mean of what it would be were force and velocity in phase.
     """
 
@@ -88,7 +90,11 @@ class Overtone(NamedTuple):
 
 
 class _Window(NamedTuple):
-    """A window that swings."""
+    """A window that swings.
+
+    Attributes:
+        from_s, to_s: where the swing began if this is the first of its stretch, and ended if it is the last.
+    """
 
     from_s: float
     to_s: float
@@ -116,11 +122,14 @@ class BuzzFinder:
         self.slow: Line | None = None
         # Windows that swing, in stretches without one that does not or has another frequency.
         self._stretches: list[list[_Window]] = [[]]
+        # Of the last window of a part without a gap, where a swing that ends in it did, and its end.
+        self._last_s, self._part_ends_s = (0.0, 0.0), dict[float, float]()
         self._left_out: list[Overtone] = []
 
     def add(self, piece: Samples) -> None:
         """Takes a piece; its times tell a rate that its period is only about."""
         if piece.begins:
+            self._part_ends_s |= {self._last_s[0]: self._last_s[1]}
             self._t_s, self._motion = np.empty(0), np.empty((3, 0))
             self._begins_s = float(piece.t_s[0])
             self._stretches.append([])
@@ -135,11 +144,12 @@ class BuzzFinder:
         while len(self._t_s) >= self._size:
             x_m, true_x_m, force_N = self._motion[:, : self._size]
             self._look(self._t_s[: self._size], x_m, true_x_m, force_N, delay_s)
-            hop = self._size // 4
+            hop = self._size // _HOPS
             self._t_s, self._motion = self._t_s[hop:], self._motion[:, hop:]
 
     def _look(self, t_s: Floats, x_m: Floats, true_x_m: Floats, force_N: Floats, delay_s: float) -> None:
         from_s, to_s = float(t_s[0]), float(t_s[-1])
+        inside_s = (to_s - from_s) / _HOPS
         rate_Hz = (len(t_s) - 1) / (to_s - from_s)
         line = swing(x_m, rate_Hz)
         if line and (slower := _overtone_of(line, x_m, rate_Hz)):
@@ -150,10 +160,10 @@ class BuzzFinder:
             last = []
             self._stretches.append(last)
         if line:
-            # What begins within a window begins in its middle, give or take half of it.
-            begins_s = from_s if from_s == self._begins_s else (from_s + to_s) / 2.0
-            fed = None if np.isnan(force_N).any() else fed_W(true_x_m, force_N, rate_Hz, line, delay_s)
-            last.append(_Window(begins_s, to_s, line, fed))
+            begins_s = from_s if from_s == self._begins_s else from_s + inside_s
+            fed = None if np.isnan(force_N).any() else fed_W(true_x_m, force_N, rate_Hz, line.frequency_Hz, delay_s)
+            last.append(_Window(begins_s, to_s - inside_s, line, fed))
+        self._last_s = to_s - inside_s, to_s
 
     def buzz(self) -> Buzz | None:
         """Returns the buzz; None where there was none, or nothing can be said.
@@ -174,17 +184,19 @@ class BuzzFinder:
         shorter = [window for stretch in self._stretches for window in stretch if is_alike(window)]
         told = sorted({*kept, *shorter}, key=lambda window: window.to_s)
         fed = [window.fed for window in told if window.fed is not None]
-        fed_W, moved_W = np.mean(fed, axis=0).tolist() if fed else (None, 0.0)
+        given_W, moved_W = np.mean(fed, axis=0).tolist() if fed else (None, 0.0)
+        # What still swings at the end of a part goes on to it.
+        ends_s = self._part_ends_s | {self._last_s[0]: self._last_s[1]}
         return Buzz(
             float(np.median(swings_Hz)),
             0.5 * _RESOLVED_HZ,
             least_Hz,
             most_Hz,
-            _joined([(window.from_s, window.to_s) for window in told]),
+            _joined([(window.from_s, ends_s.get(window.to_s, window.to_s)) for window in told]),
             width_m,
-            told[min(_FULL, len(told) - 1)].line.width,
+            told[min(_THIRD, len(told) - 1)].line.width,
             told[-1].line.width,
-            fed_W,
+            given_W,
             moved_W,
         )
 
@@ -199,7 +211,7 @@ class BuzzFinder:
             if _is_overtone(frequency_Hz, max(window.line.width for window in kept), self.slow):
                 self._left_out += [Overtone(window.line, self.slow.frequency_Hz) for window in kept]
                 return []
-        return kept
+        return _filled(kept)
 
     def overtone(self) -> Overtone | None:
         """Returns the widest line that lasted and was left out for an overtone; None where there was none."""
@@ -213,34 +225,24 @@ class BuzzFinder:
         return "none seen" if self.longest_s >= LASTS_S - 1e-9 and self.rate_Hz >= LEAST_RATE_HZ else "cannot say"
 
 
-def fed_W(x_m: Floats, force_N: Floats, rate_Hz: float, line: Line, delay_s: float) -> tuple[float, float]:
-    """Returns the mean power that a force gives to a swing, and the most that it could, were it in phase with velocity.
-
-    Each force is held for a period T from its delay d on: it gives F[k] (x(t[k] + d + T) - x(t[k] + d)), of which the
-    mean is Re(conj(F) X exp(i w d) (exp(i w T) - 1)) / T, summed over the lines of the swing. A slower press has no
-    part in it, nor what it stores; nor has the rounding of the positions, but for its share in these lines.
-    """
-    count, window = len(x_m), np.hanning(len(x_m) + 1)[:-1]
-    t = np.linspace(-1.0, 1.0, count)
-    x, force = (np.fft.rfft(window * (u - np.polyval(np.polyfit(t, u, 1), t))) for u in (x_m, force_N))
-    near = np.abs(np.fft.rfftfreq(count, 1.0 / rate_Hz) - line.frequency_Hz) < 2.5 * rate_Hz / count
-    turn = 2j * np.pi * line.frequency_Hz
-    way = x[near] * np.exp(turn * delay_s) * (np.exp(turn / rate_Hz) - 1.0)
-    scale = 2.0 * rate_Hz / (count * float((window**2).sum()))
-    return scale * float((force[near].conj() * way).real.sum()), scale * float(np.abs(force[near] * way).sum())
-
-
 def _is_overtone(frequency_Hz: float, width_m: float, of: Line, apart_Hz: float = _APART_HZ) -> bool:
     order = frequency_Hz / of.frequency_Hz
     is_multiple = abs(order - round(order)) * of.frequency_Hz < apart_Hz or of.frequency_Hz < _CLOSE_HZ
     return is_multiple and width_m < _OVERTONE / order**2 * of.width
 
 
+def _filled(stretch: list[_Window]) -> list[_Window]:
+    """Returns a stretch without the windows at its beginning of which the swing fills a part."""
+    widths = [window.line.width for window in stretch]
+    first = next((i for i, width in enumerate(widths) if width >= _KEPT * widths[min(_FULL, len(widths) - 1)]), 0)
+    return stretch[first:]
+
+
 def _joined(spans: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    """Joins spans of time that lie no further apart than half a window, which tells no shorter pause."""
+    """Joins spans of time that lie no further apart than a window, which tells no shorter pause."""
     joined: list[tuple[float, float]] = []
     for from_s, to_s in sorted(spans):
-        if joined and from_s <= joined[-1][1] + 0.5 * _WINDOW_S:
+        if joined and from_s <= joined[-1][1] + _WINDOW_S:
             joined[-1] = joined[-1][0], max(joined[-1][1], to_s)
         else:
             joined.append((from_s, to_s))

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from haploop.launch.scene.number import is_number, name_and_unit
+from haploop.launch.scene.units import is_number, name_and_unit
 from haploop.protocol.files import demand_regular
 from haploop.protocol.names import nearest
 from haploop.tools.dissipate.samples import Floats, RecordingError

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from haploop.tools.dissipate.buzz import ABOVE_HZ, LASTS_S, LEAST_FED, LEAST_RATE_HZ, Buzz, Word
+from haploop.tools.dissipate.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, Buzz, Word
+from haploop.tools.dissipate.fed import LEAST_FED
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.render.units import amount
 
@@ -89,7 +90,7 @@ def buzz_sentence(outcome: Outcome) -> str:
 
 
 def _course(buzz: Buzz) -> str:
-    """Returns whether a buzz of one stretch grows; what began within a window is as wide as it is half a second on."""
+    """Returns whether a buzz of one stretch grows."""
     if len(buzz.stretches) > 1:
         return ""
     words = _GREW if buzz.last_m > _TELLS * buzz.first_m else _DIED if buzz.first_m > _TELLS * buzz.last_m else _STAYED

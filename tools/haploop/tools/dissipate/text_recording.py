@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from haploop.launch.scene.number import scale_of
+from haploop.launch.scene.units import scale_of
 from haploop.tools.dissipate.delimited import Column, DelimitedFile
 from haploop.tools.dissipate.plausible import Largest
 from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples

@@ -12,6 +12,7 @@ import numpy as np
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Tables
 from haploop.tools.figure.data import TOGETHER, RunData
+from haploop.tools.figure.run_names import run_names
 from haploop.tools.figure.scene_units import unit_at
 from haploop.tools.render.report import plant_books
 from haploop.tools.render.terminal import told
@@ -33,7 +34,7 @@ class Difference:
     """Two runs beside each other.
 
     Attributes:
-        runs: their directories, the part that tells them apart; names: their titles.
+        runs: the names of their directories; names: their titles.
         scene: dotted key -> both values, where they are not the same; None where one scene has no such key.
         units: of the numbers among these keys, "" for none.
         results: what came of each run, by words: verdict, end, hash.
@@ -149,5 +150,6 @@ def _parting(a: RunData, b: RunData) -> tuple[int, Parting | None, str]:
 
 def difference_of(first: Path, second: Path) -> Difference:
     """Returns what the runs of two directories differ in; raises what ``RunData.from_directory`` does."""
-    unlike = (first.name, second.name) if first.name != second.name else (str(first), str(second))
-    return difference(RunData.from_directory(first), RunData.from_directory(second), runs=unlike)
+    a, b = (RunData.from_directory(directory) for directory in (first, second))
+    name_a, name_b = run_names([first, second])
+    return difference(a, b, runs=(name_a, name_b))

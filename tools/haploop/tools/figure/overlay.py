@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +10,11 @@ import numpy as np
 
 from haploop.tools.figure import style
 from haploop.tools.figure.data import Book, FigureError, RunData
-from haploop.tools.figure.difference import scene_value, unlike_keys
 from haploop.tools.figure.run_figure import badge, key_numbers
-from haploop.tools.figure.scene_units import unit_at
+from haploop.tools.figure.run_labels import labels
+from haploop.tools.figure.run_names import run_names
 from haploop.tools.figure.time import MM, line
-from haploop.tools.render.units import amount, parameters, prefix_for
+from haploop.tools.render.units import amount, prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,8 +24,6 @@ MOST_RUNS = 6
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#332288")
 # Of equal lines the one below is seen beside the one above.
 _WIDTHS = (2.8, 2.1, 1.6, 1.2, 0.9, 0.6)
-# Keys in which scenes differ that a line of the legend has room for.
-_MOST_KEYS = 3
 # A longer name of a file is cut.
 _LONGEST_NAME = 150
 
@@ -43,18 +41,19 @@ def draw_overlay(directories: Sequence[Path], target: Path | None = None) -> Pat
     """
     if len(directories) > MOST_RUNS:
         raise FigureError(
-            f"At most {MOST_RUNS} runs can be told apart in one figure, but {len(directories)} were given."
+            f"At most {MOST_RUNS} runs can be told apart in one figure, but {len(directories)} were given; draw fewer."
         )
     runs = [RunData.from_directory(directory) for directory in directories]
     others = "_".join(directory.resolve().name for directory in directories[1:])
-    return style.write_figure(make_overlay(runs), target or directories[0] / f"with_{others[:_LONGEST_NAME]}.png")
+    figure = make_overlay(runs, run_names(directories))
+    return style.write_figure(figure, target or directories[0] / f"with_{others[:_LONGEST_NAME]}.png")
 
 
-def make_overlay(runs: Sequence[RunData]) -> Figure:
-    """Makes the figure of several runs; FigureError where matplotlib is missing."""
+def make_overlay(runs: Sequence[RunData], names: Sequence[str]) -> Figure:
+    """Makes the figure of several runs and their names; FigureError where matplotlib is missing."""
     figure = style.empty_figure(15.0, 9.0 + 0.25 * len(runs))
-    told = labels(runs)
-    rows = len(runs) + (is_titled := told[0] != runs[0].scene.title and not told[0].startswith(runs[0].scene.title))
+    told = labels(runs, names)
+    rows = len(runs) + (is_titled := len({run.scene.title for run in runs}) == 1)
     header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.02 + 0.025 * rows, 1.0))[:, 0]
     span_s = min(run.span_s[0] for run in runs), max(run.span_s[1] for run in runs)
     ends_s = min(run.span_s[1] for run in runs)  # where all have something to show
@@ -73,39 +72,6 @@ def make_overlay(runs: Sequence[RunData]) -> Figure:
         y = 1.0 - (place + is_titled + 0.5) / rows
         _head(header, run, label, y, _COLOURS[place])
     return figure
-
-
-def labels(runs: Sequence[RunData]) -> list[str]:
-    """Returns for each run its name, where not all have the same, and what of its scene differs."""
-    unlike = unlike_keys([run.scene for run in runs])
-    titles = [run.scene.title for run in runs]
-    if not unlike:
-        return titles
-    differ = [_differs(run, place, runs, unlike) for place, run in enumerate(runs)]
-    if len({*titles}) == 1 and all(differ):
-        return differ
-    return [f"{title} ({words})" if words else title for title, words in zip(titles, differ, strict=True)]
-
-
-def _differs(run: RunData, place: int, runs: Sequence[RunData], unlike: Mapping[str, Sequence[Any]]) -> str:
-    """Returns what of a run's scene is not the same in all: elements in words, of which some have none, then keys."""
-    words, told = [], set[str]()
-    for slot in range(max(len(one.scene.dissipation) for one in runs)):
-        there = [one.scene.dissipation[slot] if slot < len(one.scene.dissipation) else None for one in runs]
-        if len({element and element.name for element in there}) > 1:
-            told.add(f"dissipation.{slot}.")
-            if (own := there[place]) is not None:
-                numbers = parameters(own.as_dict(), run.units)
-                words.append(f"with {own.name}" + (f" ({numbers})" if numbers else ""))
-            else:
-                words.append(f"without {' or '.join(dict.fromkeys(one.name for one in there if one))}")
-    for key, values in unlike.items():
-        if values[place] is not None and not key.startswith(tuple(told)):
-            words.append(f"{key} {scene_value(values[place])} {unit_at(run.scene, key, run.units)}".rstrip())
-    # Where it has none of the keys, those of the others.
-    words = words or [f"no {key}" for key in unlike]
-    more = f" and {len(words) - _MOST_KEYS} more" if len(words) > _MOST_KEYS else ""
-    return ", ".join(words[:_MOST_KEYS]) + more
 
 
 def _head(header: Figure | SubFigure, run: RunData, label: str, y: float, colour: str) -> None:

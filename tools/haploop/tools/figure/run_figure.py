@@ -6,6 +6,7 @@ import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from haploop.launch.plan.effects import notes
 from haploop.protocol.changes import Change, describe, is_change
 from haploop.tools.figure import style
 from haploop.tools.figure.data import TOGETHER, Book, RunData
@@ -13,7 +14,7 @@ from haploop.tools.figure.loops import draw_force_position, draw_momentum
 from haploop.tools.figure.own_columns import draw_own_columns, own_columns
 from haploop.tools.figure.scene_units import unit_at
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
-from haploop.tools.render.report import HELD, count_losses, leak_rows, plant_books, swing_words
+from haploop.tools.render.report import HELD, count_losses, leak_rows, noted, plant_books, swing_words
 from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount, parameters, spring
 
@@ -50,8 +51,9 @@ def make_figure(run: RunData) -> Figure:
     """Makes the figure of a run, with all panels; FigureError where matplotlib is missing."""
     rows = 3 + bool(own_columns(run))
     figure = style.empty_figure(15.0, 9.2 + 2.9 * (rows - 3))
-    events = [*textwrap.wrap(failure(run), _LINE_LETTERS - 30), *event_lines(run)]
-    heights = 0.085, 1.0, 0.001 + 0.025 * len(events)
+    told_below = [failure(run), noted(notes(run.scene))]
+    below = [line for words in told_below for line in textwrap.wrap(words, _LINE_LETTERS - 30)] + event_lines(run)
+    heights = 0.085, 1.0, 0.001 + 0.025 * len(below)
     header, body, footer = figure.subfigures(3, 1, squeeze=False, height_ratios=heights)[:, 0]
     grid = body.add_gridspec(rows, 3, width_ratios=(1.9, 1.25, 1.15))
     close_s = run.close_s()
@@ -75,7 +77,7 @@ def make_figure(run: RunData) -> Figure:
     _draw_books(body.add_subplot(grid[2, 1:]), run, books, colours)
     draw_own_columns(body, grid, 3, run)
     _draw_header(header, run)
-    footer.text(0.012, 0.5, "\n".join(events), fontsize=style.SMALL + 0.5, color=style.GREY, va="center", gid="events")
+    footer.text(0.012, 0.5, "\n".join(below), fontsize=style.SMALL + 0.5, color=style.GREY, va="center", gid="events")
     body.align_ylabels()
     return figure
 

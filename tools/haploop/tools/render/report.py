@@ -16,12 +16,15 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
 
+    from haploop.launch.plan.meant.rule import Note
     from haploop.launch.stability.decide import Finding
     from haploop.logger.summary import Summary
     from haploop.protocol.transport.wire import Message
 
 _ITS_WORD = "That the {} does what the scene says is its own word; haploop replay holds it against the scene."
 _TRIED = "a hold of {}, pushed by up to {}; haploop advise tries taps, other holds and devices"
+_NOTE = "A note on its scene: {first}"
+_NOTES = "{count} notes on its scene, of which the first: {first}"
 # Entries of the summary's window, their words, and what stands after the number. Peaks of two swings do not add.
 _OF_FORCE = {
     "force_swing_N": ("force", " peak to peak at its end"),
@@ -56,14 +59,21 @@ def count_losses(summary: Summary) -> dict[str, int]:
     return {words: count for words, count in found.items() if count}
 
 
-def print_summary(summary: Summary, kept_off_by: Sequence[str] = ()) -> None:
-    console().print(summary_table(summary, kept_off_by))
+def noted(notes: Sequence[str]) -> str:
+    """Returns how many notes on a scene there are, and the first of them; "" for none."""
+    words = _NOTES if len(notes) > 1 else _NOTE if notes else ""
+    return words.format(count=len(notes), first=notes[0]) if notes else ""
 
 
-def summary_table(summary: Summary, kept_off_by: Sequence[str] = ()) -> RenderableType:
+def print_summary(summary: Summary, notes: Sequence[Note] = ()) -> None:
+    console().print(summary_table(summary, notes))
+
+
+def summary_table(summary: Summary, notes: Sequence[Note] = ()) -> RenderableType:
     """Makes the report of a run from its summary: verdict, key numbers and every book of energy.
 
-    ``kept_off_by`` are sentences on why the device does not touch the wall, told where it did not.
+    Of ``notes`` on its scene those on why the device does not touch the wall stand at the verdict of one that did not;
+    what there are stand at the end, beside the verdict, since the report is longer than many a terminal.
     """
     from rich.console import Group
     from rich.text import Text
@@ -78,7 +88,7 @@ def summary_table(summary: Summary, kept_off_by: Sequence[str] = ()) -> Renderab
     if summary["verdict"] in SWINGS and (why := cause(summary["energy"])):
         parts.append(Text(f"Likely cause: {why}"))
     if summary["verdict"] == "no-contact":
-        parts += map(Text, kept_off_by)
+        parts += [Text(note) for note in notes if note.keeps_off]
     if summary["ended"] not in ("done", "diverged"):
         why = f", since {summary['why'].rstrip('.')}" if summary["ended"] == "failed" and summary["why"] else ""
         parts.append(Text(f"ended early: {summary['ended']}{why}", style="bold red"))
@@ -86,7 +96,8 @@ def summary_table(summary: Summary, kept_off_by: Sequence[str] = ()) -> Renderab
     parts += [Text(sentence, style="bold yellow") for sentence in told_too]
     parts += [Text(_ITS_WORD.format(words.split()[0])) for words, _ in program_rows(summary)]
     control_rate = summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
-    return Group(*parts, make_facts(_key_figures(summary)), _books(summary["energy"], control_rate))
+    end = [Text.assemble((word, verdict_style(word)), "  ", (noted(notes), "bold yellow"))] if notes else []
+    return Group(*parts, make_facts(_key_figures(summary)), _books(summary["energy"], control_rate), *end)
 
 
 def _key_figures(summary: Summary) -> list[tuple[str, str]]:

@@ -68,14 +68,15 @@ def make_table(
     """
     from rich import box
     from rich.table import Table
+    from rich.text import Text
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=padding)
     for place, head in enumerate(heads):
         if head in numbers:
-            table.add_column(head, justify="right", no_wrap=True, min_width=least_width)
+            table.add_column(Text(head), justify="right", no_wrap=True, min_width=least_width)
         else:
             width = None if place else first_width
-            table.add_column(head, no_wrap=head in unbroken, overflow="fold", min_width=width)
+            table.add_column(Text(head), no_wrap=head in unbroken, overflow="fold", min_width=width)
     return table
 
 

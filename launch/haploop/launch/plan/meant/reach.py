@@ -16,6 +16,10 @@ from haploop.launch.plan.meant.rule import Found, Rule
 from haploop.protocol.scene.hand_force import Sine, constant_from_s
 from haploop.protocol.scene.scene import Scene, hand_is_unmodelled
 
+# A force does next to nothing against friction of which it is no more than this share, or a spring that it stretches by
+# no more than this share of the way.
+_FEEBLE = 0.1
+
 
 def _pushed_by_nothing(scene: Scene) -> Found | None:
     """Tells whether a device is at rest at t = 0 in balance, without a force to come; noise alone may move it."""
@@ -33,9 +37,20 @@ def _held_by_friction(scene: Scene) -> Found | None:
     is_pushed = scene.others or scene.device.velocity or start_depth_m(scene) > 0.0 or wall_moves(scene)
     if hand is None or rubs is None or hand_is_unmodelled(scene) or is_pushed:
         return None
-    push_N = most_force_N(scene) + hand.stiffness * abs(hand.rest - begin)
-    friction_N = max(rubs.kinetic, rubs.breakaway or 0.0)
+    push_N, friction_N = most_force_N(scene) + hand.stiffness * abs(hand.rest - begin), _friction_N(scene)
     return {"friction_N": friction_N, "push_N": push_N} if 0.0 < push_N <= friction_N else None
+
+
+def _feeble_beside_friction(scene: Scene) -> Found | None:
+    """Compares the hand's largest force with dry friction, of a device that something else moves."""
+    if hand_is_unmodelled(scene) or _held_by_friction(scene) is not None:
+        return None
+    force_N, friction_N = most_force_N(scene), _friction_N(scene)
+    return {"force_N": force_N, "friction_N": friction_N} if 0.0 < force_N <= _FEEBLE * friction_N else None
+
+
+def _friction_N(scene: Scene) -> float:
+    return max(scene.friction.kinetic, scene.friction.breakaway or 0.0) if scene.friction else 0.0
 
 
 def _beyond_the_end(scene: Scene) -> Found | None:
@@ -63,9 +78,7 @@ def _out_of_reach(scene: Scene) -> Found | None:
         way_m = abs(wall.position - device.position) - count_m(scene)
         return {"way_mm": way_m * 1e3, "reach_mm": reach_m * 1e3} if way_m > reach_m else None
     mass, damping = device.mass + (hand.mass if hand else 0.0), device.damping + (hand.damping if hand else 0.0)
-    force_N, spring = most_force_N(scene), hand.stiffness if hand else 0.0
-    if scene.friction:
-        force_N += max(scene.friction.kinetic, scene.friction.breakaway or 0.0)
+    force_N, spring = most_force_N(scene) + _friction_N(scene), hand.stiffness if hand else 0.0
     seconds, speed = scene.duration, abs(device.velocity)
     begin, reach_m = device.position, speed * seconds + force_N * seconds**2 / (2.0 * mass)
     if hand and spring:
@@ -108,20 +121,32 @@ def _pushed_away(scene: Scene) -> Found | None:
 
 
 def _not_held_there(scene: Scene) -> Found | None:
-    """Compares the way to the wall with where the hand's force, over its stiffness, holds the device in the end."""
+    """Compares the way to the wall with where the hand's force, over its stiffness, holds the device in the end.
+
+    What is thrown at the wall may be meant to leave it again, but hardly by a hand whose force does next to nothing.
+    """
     hand, device, wall = scene.hand, scene.device, scene.wall
     if hand is None or wall is None or hand_is_unmodelled(scene) or not hand.stiffness or not hand.force:
         return None
-    moves = device.velocity or isinstance(hand.force, Sine) or scene.others or scene.noise or wall_moves(scene)
+    moves = isinstance(hand.force, Sine) or scene.others or scene.noise or wall_moves(scene)
     if moves or start_depth_m(scene) >= -count_m(scene) or any(of(scene) is not None for of in _KEPT_OFF):
         return None
     way_m = (wall.position - hand.rest) * inward(wall) - count_m(scene)
     reach_m = inward_force_N(scene) / hand.stiffness
+    if device.velocity and not 0.0 < reach_m <= _FEEBLE * way_m:
+        return None
     return {"way_mm": way_m * 1e3, "reach_mm": reach_m * 1e3} if way_m > reach_m else None
 
 
 # Each tells by itself why the wall is not reached.
-_KEPT_OFF = (_pushed_by_nothing, _held_by_friction, _beyond_the_end, _out_of_reach, _pushed_away)
+_KEPT_OFF = (
+    _pushed_by_nothing,
+    _held_by_friction,
+    _feeble_beside_friction,
+    _beyond_the_end,
+    _out_of_reach,
+    _pushed_away,
+)
 
 REACH = (
     Rule(
@@ -136,6 +161,13 @@ REACH = (
         "friction.kinetic",
         "Dry friction of {friction_N:.3g} N holds the device, which the hand pushes by {push_N:.3g} N at most: it "
         "hardly moves. Is that the unit that was meant?",
+        keeps_off=True,
+    ),
+    Rule(
+        _feeble_beside_friction,
+        "hand.force",
+        "The hand's largest force, {force_N:.3g} N, is hardly anything beside the device's dry friction of "
+        "{friction_N:.3g} N: it does not press a device that has come to rest. Is that the unit that was meant?",
         keeps_off=True,
     ),
     Rule(

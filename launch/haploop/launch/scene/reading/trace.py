@@ -6,7 +6,7 @@ import csv
 from pathlib import Path
 
 from haploop.launch.scene.models import fault
-from haploop.launch.scene.number import is_number, name_and_unit, scale_of
+from haploop.launch.scene.units import is_number, name_and_unit, scale_of
 from haploop.protocol.files import read_text
 
 

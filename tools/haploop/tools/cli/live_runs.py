@@ -1,0 +1,128 @@
+"""Runs as the live page finds them: those that live, and those that are over in ``runs``."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from haploop.launch.processes.run_directory import LiveRun
+    from haploop.protocol.scene.scene import Scene
+    from haploop.protocol.transport.sockets import SecureContext
+    from haploop.protocol.transport.wire import Message
+
+# Recorded runs are looked for here, and so many of them offered.
+_RUNS, _MOST_PAST = "runs", 50
+
+
+@dataclass
+class RecordedRun:
+    """A run that is over, as a viewer finds it."""
+
+    id: str
+    out: Path
+    title: str
+    told: str
+    clock: str = ""
+    is_here: bool = True
+
+    @classmethod
+    def of_summary(cls, file: Path, ended_s: float) -> RecordedRun:
+        """Makes it of its summary, written at a time in s; of one that cannot be read its folder's name is told."""
+        from haploop.logger.log import LogError
+        from haploop.logger.summary import read
+
+        name, when = file.parent.name, time.strftime("%d %b %H:%M", time.localtime(ended_s))
+        try:
+            summary = read(file)
+            told = [summary["verdict"], *summary.get("stability", {}).get("provisos", ()), when]
+            return cls(name, file.parent, summary.get("title") or name, ", ".join(told))
+        except (LogError, KeyError):
+            return cls(name, file.parent, name, when)
+
+    def scene(self) -> Scene:
+        """Reads its resolved scene; raises OSError where there is none."""
+        from haploop.launch.runs.run_files import recorded_scene
+        from haploop.launch.scene.mistakes import SceneError
+
+        try:
+            scene = recorded_scene(self.out, {})
+        except SceneError as error:
+            raise OSError(str(error)) from error
+        if scene is None:
+            raise FileNotFoundError(f"There is no scene.toml in {self.out}.")
+        return scene
+
+    def units(self, scene: Scene, keys: Iterable[str]) -> dict[str, str]:
+        """Returns the units of these keys of a scene, and by kind and parameter; no key that has none."""
+        from haploop.tools.figure.scene_units import element_units, unit_at
+
+        kinds = element_units()
+        return kinds | {key: unit for key in keys if (unit := unit_at(scene, key, kinds))}
+
+    def make_context(self) -> SecureContext:
+        """Raises: nobody is there to connect to."""
+        raise OSError(f"Run {self.id} is over.")
+
+
+class LiveRuns:
+    """The live runs of this user, as a viewer finds and steers them; or one run elsewhere alone."""
+
+    def __init__(self, only: LiveRun | None = None) -> None:
+        self._only = only
+        self._recorded: dict[tuple[Path, float], RecordedRun] = {}
+
+    def live(self) -> Sequence[LiveRun]:
+        """Returns the runs that live now, the oldest first."""
+        from haploop.launch.processes import run_directory
+
+        return [self._only] if self._only else run_directory.live_runs()
+
+    def past(self) -> Sequence[RecordedRun]:
+        """Returns the recorded runs in ./runs that have a summary, the newest first; of a run elsewhere none."""
+        if self._only:
+            return []
+        found = sorted(((file.stat().st_mtime, file) for file in Path(_RUNS).glob("*/summary.json")), reverse=True)
+        now = {(file, ended_s) for ended_s, file in found[:_MOST_PAST]}
+        self._recorded = {key: run for key, run in self._recorded.items() if key in now}
+        for key in now - self._recorded.keys():
+            self._recorded[key] = RecordedRun.of_summary(*key)
+        return [self._recorded[file, ended_s] for ended_s, file in found[:_MOST_PAST]]
+
+    def stiffness_limit(self, scene: Scene) -> float | str:
+        """Returns the largest stiffness with which the linear map of a loop is stable, N/m, or why there is none."""
+        from haploop.controller.dissipation.element import ElementError
+        from haploop.tools.linear.linearity import why_not_linear
+        from haploop.tools.linear.one_tick import NeverStable, OneTickMap
+
+        try:
+            if curved := why_not_linear(scene):
+                return f"not linear, by {' and '.join(curved)}"
+            limit = OneTickMap.from_scene(scene).stiffness_limit()
+        except NeverStable:
+            return "unstable with the softest wall"
+        except (ElementError, ValueError, KeyError, ArithmeticError):
+            return "an element that is not known here"
+        return limit if math.isfinite(limit) else "stable with any wall"
+
+    def has_launcher(self, run: LiveRun) -> bool:
+        """Returns whether the process that started a run is there, which judges it in the end."""
+        from haploop.launch.processes import run_directory
+
+        return run_directory.has_launcher(run)
+
+    def ask(self, run: LiveRun, verb: str, arguments: Message) -> tuple[str, Message]:
+        """Has a run carry out a command."""
+        from haploop.launch.processes.run_directory import CommandRefused, RunNotFound, ask
+        from haploop.view.receive.runs import CommandFailed
+
+        try:
+            return ask(run, verb, **arguments)
+        except (CommandRefused, RunNotFound) as error:
+            raise CommandFailed(str(error)) from error
+        except (TypeError, ValueError, OverflowError) as error:  # names of its own, numbers no message can carry
+            raise CommandFailed(f"The arguments of {verb} cannot be used: {error}.") from error
