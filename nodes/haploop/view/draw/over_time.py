@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import compress
 
 import numpy as np
 
 from haploop.view.draw.messages import Column, Table
+from haploop.view.look.book_names import book_names, kind_of
 from haploop.view.store.history import TRUE, WALL_BOOK, History
 from haploop.view.store.lod_series import LodSeries
 
@@ -19,7 +19,6 @@ _ROWS_A_POINT, _BUCKETS_A_POINT = 2.0, 1.0
 _OVERVIEW_PARTS, _MOST_UNITS = 256, 3
 _BODIES = {"x": "position", "tip_x": "tip", "hand_x": "hand"}
 _MEASURED = {"wall_position": Column("wall", "m", "wall"), "x_measured": Column("x_measured", "m", "measured")}
-_MAKING = re.compile(r"-\d+$")
 # Columns of one series by name, each with its header entry.
 Part = tuple[LodSeries, Mapping[str, Column]]
 # Which columns are worth showing, as truth values, from their values in the interval, shape (columns, rows).
@@ -103,8 +102,11 @@ def _energy(history: History) -> tuple[str, list[Part], AreShown]:
     """Lists the books of the wall, of the elements at work, and of those whose energy changes in the interval."""
     columns = {WALL_BOOK: Column("wall", "J", "wall")} if history.at_work.wall else {}
     books = [name.removesuffix(TRUE) for name in history.energy.names if name.endswith(TRUE) and name != WALL_BOOK]
-    at_work = _books_at_work(history, books)
-    columns |= {f"{name}{TRUE}": Column(name, "J", at_work.get(name, f"{name}, closed")) for name in books}
+    at_work, named = _books_at_work(history, books), book_names(history)
+    columns |= {
+        f"{name}{TRUE}": Column(name, "J", at_work.get(name, f"{named.get(name, 'earlier elements')}, closed"))
+        for name in books
+    }
     columns["residual"] = Column("residual", "J", "residual")
     always = {"wall", "residual", *at_work}
 
@@ -126,7 +128,7 @@ def _books_at_work(history: History, books: list[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for kind in dict.fromkeys(element.name for _, element in elements):
         labels = [f"element {place}: {kind}" for place, element in elements if element.name == kind]
-        own = [name for name in books if _MAKING.sub("", name) == kind][-len(labels) :]
+        own = [name for name in books if kind_of(name) == kind][-len(labels) :]
         found |= dict(zip(own, labels, strict=False))
     return found
 
