@@ -31,6 +31,8 @@ _MADE = "`make docs`, which makes these pages a site, with a reference that is g
 _HERE = ", ".join(f"[{page}](docs/reference/{page}.md)" for page in ("scene", "commands", "summary", "log", "api"))
 _PICTURE = re.compile(r"(?<!\[)(!\[[^\]]*\]\(([^)\s]+)\))")
 _LINK = re.compile(r"(!?)\[((?:[^\]\[]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
+# A command or a name in a sentence that is short enough to stand in one line of a phone.
+_SHORT = re.compile(r"<code>([^<>]{1,28})</code>")
 
 
 def on_files(files: Files, config: Any) -> Files:
@@ -40,6 +42,11 @@ def on_files(files: Files, config: Any) -> Files:
     for page, make in reference.PAGES.items():
         files.append(File.generated(config, page, content=make()))
     return files
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """Returns the page with its short pieces of code marked as whole: a browser would break them after every hyphen."""
+    return _SHORT.sub(r'<code class="whole">\1</code>', html)
 
 
 def on_post_build(config: Any) -> None:

@@ -57,6 +57,18 @@ def test_bars_of_energy_lie_left_of_zero_where_they_feed_and_right_where_they_ta
     expect(page.locator("#budget output").first).to_have_text("−250 µW")
 
 
+def test_a_cause_that_comes_later_has_its_bar_where_it_is_told_and_not_below_the_store(stand_in, page):
+    def told(*names):
+        rows = [{"name": name, "total_J": 1e-3, "window_J": 0.0} for name in names]
+        stand_in.show(with_header(contact(), budget={"from_s": 1.0, "to_s": 3.0, "about_s": 0.0, "rows": rows}))
+        expect(page.locator("#budget dt")).to_have_text([*names])
+
+    page.click("[data-panel=energy]")
+    stand_in.asked(lambda watch: watch["panel"] == "energy")
+    told("hand", "damping", "put into store")
+    told("hand", "damping, from 0 s", "damping, from 1.2 s", "put into store")
+
+
 def ramp_from(start_s):
     """Two seconds in which a position rises evenly to 10 mm."""
     rows = [0.01 * i / 400 for i in range(401)]

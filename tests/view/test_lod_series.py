@@ -108,6 +108,29 @@ def test_a_gap_stays_unknown_and_what_is_known_is_passed_over():
     assert np.isnan(pairs[14:187]).all()
 
 
+@pytest.mark.parametrize("rows_per_tick", [1, 5, 10])
+def test_what_another_series_holds_as_ranges_only_is_taken_as_such(rows_per_tick):
+    """A log that is read more slowly than the run goes: what was received meanwhile is not held in full any more."""
+    begun, ticks = 18_944, 60_000
+    series, rows = fed(rows_per_tick, 20_000)
+    full = np.random.default_rng(1).normal(size=ticks * rows_per_tick)
+    full[: len(rows)] = rows
+    live = LodSeries(rows_per_tick, 512, begun)
+    for tick in range(begun, ticks, 100):
+        end = min(ticks, tick + 100)
+        live.append(tick, {"x": full[tick * rows_per_tick : end * rows_per_tick]})
+    series.extend_from(live)
+    assert series.end_tick == ticks
+    full_from = series.full_from_tick
+    assert live.full_from_tick <= full_from < live.full_from_tick + 64
+    pairs = series.envelope(["x"], 0, 59_904, 512)[0].reshape(-1, 2)
+    np.testing.assert_array_equal(
+        np.sort(pairs), least_and_greatest(full[: 59_904 * rows_per_tick].reshape(len(pairs), -1))
+    )
+    newest = series.rows(["x"], full_from, ticks)[0]
+    np.testing.assert_array_equal(newest, full[full_from * rows_per_tick :])
+
+
 def test_a_column_that_comes_in_mid_run_is_unknown_before_and_kept_from_there_on():
     series = LodSeries(1, 512, 0)
     series.append(0, {"x": np.zeros(5000)})

@@ -9,6 +9,7 @@ import pytest
 from haploop.launch import load, run
 from haploop.protocol.scene.scene import Wall
 from haploop.protocol.ticks import Timebase
+from haploop.view.look.book_names import book_names
 from haploop.view.look.budget import budget
 from haploop.view.look.compare import Changes
 from haploop.view.look.sight import see
@@ -162,6 +163,27 @@ def test_the_budget_closes_and_its_causes_are_those_of_the_summary(tmp_path):
     for late, soon, whole in zip(last["rows"], early["rows"], found["rows"], strict=True):
         assert late["window_J"] + soon["total_J"] == pytest.approx(whole["total_J"], abs=1e-15)
     assert abs(sum(row["window_J"] for row in last["rows"])) < 1e-17
+
+
+def test_an_element_that_was_changed_is_told_by_kind_and_by_when_each_of_its_numbers_came(tmp_path):
+    def names(name, events):
+        damped = {"duration": 0.5, "dissipation": [{"kind": "damping", "damping": 1.0}]}
+        history, _ = recorded(tmp_path / name, **damped, event=events)
+        found = budget(history, 0, history.end_tick)
+        assert found
+        return [row["name"] for row in found["rows"] if "damping" in row["name"]]
+
+    faster = [{"at": at, "set": {"dissipation.0.damping": size}} for at, size in ((0.12, 2.0), (0.2345, 3.0))]
+    assert names("as it was", []) == ["damping"]
+    assert names("changed", faster) == ["damping, from 0 s", "damping, from 0.12 s", "damping, from 0.235 s"]
+
+
+def test_of_a_run_joined_on_its_way_nobody_is_told_since_when_what_was_there_is_at_work():
+    history, row = History(TIME, 1000), np.arange(100.0)
+    history.append_energy(1000, {"wall.true": row, "damping-2.true": row, "damping-3.true": row})
+    history.append_energy(1100, {"wall.true": row, "damping-2.true": row, "damping-3.true": row, "damping-4.true": row})
+    told = {"damping-2": "damping, earlier", "damping-3": "damping, earlier (2)", "damping-4": "damping, from 1.1 s"}
+    assert book_names(history) == told
 
 
 def test_what_the_law_of_a_wall_takes_is_a_cause_of_its_own_and_no_leak(tmp_path):

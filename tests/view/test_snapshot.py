@@ -147,7 +147,9 @@ def test_a_book_that_is_closed_is_shown_only_while_its_energy_changes():
     shown = [column["name"] for column in drawn(history, span_s=1.0)["tables"]["energy"]["columns"]]
     assert shown == ["wall", "damping", "damping-2", "residual"]
     labels = [column["label"] for column in drawn(history, span_s=1.0)["tables"]["energy"]["columns"]]
-    assert labels == ["wall", "damping, closed", "element 0: damping", "residual"], "as the chart of forces has it"
+    assert labels == ["wall", "damping, from 0 s, closed", "element 0: damping", "residual"], (
+        "as the chart of forces has it"
+    )
 
 
 def test_numbers_beyond_what_a_float32_holds_do_not_break_the_snapshot():

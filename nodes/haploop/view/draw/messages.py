@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
@@ -31,6 +32,10 @@ _JUDGED = (
     ("oscillation_m", "displayed_stiffness_N_m"),
     ("residual_J", "moved_J", "balance"),
 )
+
+
+# Kept: json.dumps makes one for every header.
+_COMPACT = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 
 
 class Column(NamedTuple):
@@ -63,6 +68,11 @@ class Table:
     more: dict[str, Any] = dataclasses.field(default_factory=dict)
 
 
+@lru_cache(maxsize=64)
+def _named(columns: tuple[Column, ...]) -> list[dict[str, str]]:
+    return [column._asdict() for column in columns]
+
+
 def encode(from_s: float, to_s: float, tables: Sequence[Table], **more: Any) -> bytes:
     """Returns the snapshot of an interval of time as bytes.
 
@@ -76,15 +86,15 @@ def encode(from_s: float, to_s: float, tables: Sequence[Table], **more: Any) -> 
             "t0_s": table.t0_s,
             "dt_s": table.dt_s,
             "rows": table.values.shape[1],
-            "columns": [column._asdict() for column in table.columns],
+            "columns": _named(tuple(table.columns)),
             "envelope": table.envelope,
-            "last": finite(list(table.last)),
+            "last": finite(table.last),
             **finite(table.more),
         }
         for table in tables
     ]
     header = {"from_s": from_s, "to_s": to_s, "tables": entries, **finite(more)}
-    head = json.dumps(header, separators=(",", ":"), allow_nan=False).encode()
+    head = _COMPACT.encode(header).encode()
     head += b" " * (-(4 + len(head)) % 8)
     parts = [len(head).to_bytes(4, "little"), head]
     with np.errstate(over="ignore", invalid="ignore"):  # beyond what a float32 holds is infinite on the screen too

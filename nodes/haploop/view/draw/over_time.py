@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import compress
 
 import numpy as np
 
 from haploop.view.draw.messages import Column, Table
+from haploop.view.look.book_names import book_names, kind_of
 from haploop.view.store.history import TRUE, WALL_BOOK, History
 from haploop.view.store.lod_series import LodSeries
 
@@ -18,15 +19,14 @@ _ROWS_A_POINT, _BUCKETS_A_POINT = 2.0, 1.0
 _OVERVIEW_PARTS, _MOST_UNITS = 256, 3
 _BODIES = {"x": "position", "tip_x": "tip", "hand_x": "hand"}
 _MEASURED = {"wall_position": Column("wall", "m", "wall"), "x_measured": Column("x_measured", "m", "measured")}
-_MAKING = re.compile(r"-\d+$")
 # Columns of one series by name, each with its header entry.
 Part = tuple[LodSeries, Mapping[str, Column]]
-# Whether a column is worth showing, from its values in the interval.
-IsShown = Callable[[Column, np.ndarray], bool]
+# Which columns are worth showing, as truth values, from their values in the interval, shape (columns, rows).
+AreShown = Callable[[Sequence[Column], np.ndarray], np.ndarray]
 
 
-def is_there(_: Column, values: np.ndarray) -> bool:
-    return bool(np.isfinite(values).any())
+def are_there(_: Sequence[Column], values: np.ndarray) -> np.ndarray:
+    return np.logical_or.reduce(np.isfinite(values), axis=1)
 
 
 class Interval:
@@ -35,35 +35,37 @@ class Interval:
     def __init__(self, first: int, end: int, rate: int, points: int) -> None:
         self._first, self._end, self._rate, self._points = first, end, rate, points
 
-    def table(self, name: str, parts: list[Part], is_shown: IsShown = lambda *_: True) -> Table | None:
+    def table(self, name: str, parts: list[Part], are_shown: AreShown | None = None) -> Table | None:
         """Returns a table of columns of some series, the first of which has the most rows a tick; None for none."""
         if not parts[0][1]:
             return None
         all_series, most = [series for series, _ in parts], parts[0][0].rows_per_tick
+        wanted = [(series, tuple(columns)) for series, columns in parts]
         in_full = all(series.full_from_tick <= self._first for series in all_series)
         if in_full and (self._end - self._first) * most <= _ROWS_A_POINT * self._points:
             first, step = float(self._first), 1.0 / most
             values = [
-                series.rows(list(columns), self._first, self._end).repeat(most // series.rows_per_tick, axis=1)
-                for series, columns in parts
+                series.rows(names, self._first, self._end).repeat(most // series.rows_per_tick, axis=1)
+                for series, names in wanted
             ]
         else:
             in_full, bucket = False, self._bucket(all_series)
             begins = all_series[0].aligned(self._first, bucket)
             ends = self._end + (begins - self._end) % bucket
-            values = [series.envelope(list(columns), begins, ends, bucket) for series, columns in parts]
+            values = [series.envelope(names, begins, ends, bucket) for series, names in wanted]
             first, step = begins + bucket / 4.0, bucket / 2.0
-        rows, columns = np.concatenate(values), [known for _, columns in parts for known in columns.values()]
-        shown = [i for i, known in enumerate(columns) if is_shown(known, rows[i])]
-        if not shown:
-            return None
-        columns, last = [columns[i] for i in shown], self._last(parts)[shown].tolist()
-        return Table(name, first / self._rate, step / self._rate, columns, rows[shown], not in_full, last)
+        rows = np.concatenate(values) if len(values) > 1 else values[0]
+        columns, last = [known for _, columns in parts for known in columns.values()], self._last(wanted)
+        if are_shown and not (shown := are_shown(columns, rows)).all():
+            if not shown.any():
+                return None
+            columns, rows, last = list(compress(columns, shown)), rows[shown], last[shown]
+        return Table(name, first / self._rate, step / self._rate, columns, rows, not in_full, last.tolist())
 
-    def _last(self, parts: list[Part]) -> np.ndarray:
-        """Returns the columns at the beginning of the newest tick that all series know; NaN where it is not in full."""
-        tick = min([self._end, *(series.end_tick for series, _ in parts)]) - 1
-        return np.concatenate([series.rows(list(columns), tick, tick + 1)[:, 0] for series, columns in parts])
+    def _last(self, wanted: Sequence[tuple[LodSeries, Sequence[str]]]) -> np.ndarray:
+        """Returns columns at the beginning of the newest tick that all series know; NaN where it is not in full."""
+        tick = min([self._end, *(series.end_tick for series, _ in wanted)]) - 1
+        return np.concatenate([series.rows(names, tick, tick + 1)[:, 0] for series, names in wanted])
 
     def _bucket(self, all_series: list[LodSeries]) -> int:
         """Returns the ticks of a bucket: the least power of two that leaves no more buckets than there is room for."""
@@ -74,18 +76,18 @@ class Interval:
         return bucket
 
 
-def _position(history: History) -> tuple[str, list[Part], IsShown]:
+def _position(history: History) -> tuple[str, list[Part], AreShown | None]:
     moving = {name: Column(name, "m", label) for name, label in _BODIES.items() if name in history.steps.names}
-    return "position", [(history.steps, moving), (history.ticks, _MEASURED)], lambda *_: True
+    return "position", [(history.steps, moving), (history.ticks, _MEASURED)], None
 
 
-def _force(history: History) -> tuple[str, list[Part], IsShown]:
+def _force(history: History) -> tuple[str, list[Part], AreShown]:
     """Lists wall, elements by place and total, each shown where it has values in the interval."""
     columns = {"wall": Column("wall", "N", "wall")} if history.at_work.wall else {}
     for name, place, kind in sorted(by_place(history, "element"), key=lambda element: int(element[1])):
         columns[name] = Column(name, "N", f"element {place}: {kind}")
     columns["total"] = Column("total", "N", "total")
-    return "force", [(history.ticks, columns)], is_there
+    return "force", [(history.ticks, columns)], are_there
 
 
 def by_place(history: History, what: str) -> Iterator[tuple[str, str, str]]:
@@ -96,20 +98,25 @@ def by_place(history: History, what: str) -> Iterator[tuple[str, str, str]]:
             yield name, place, kind
 
 
-def _energy(history: History) -> tuple[str, list[Part], IsShown]:
+def _energy(history: History) -> tuple[str, list[Part], AreShown]:
     """Lists the books of the wall, of the elements at work, and of those whose energy changes in the interval."""
     columns = {WALL_BOOK: Column("wall", "J", "wall")} if history.at_work.wall else {}
     books = [name.removesuffix(TRUE) for name in history.energy.names if name.endswith(TRUE) and name != WALL_BOOK]
-    at_work = _books_at_work(history, books)
-    columns |= {f"{name}{TRUE}": Column(name, "J", at_work.get(name, f"{name}, closed")) for name in books}
+    at_work, named = _books_at_work(history, books), book_names(history)
+    columns |= {
+        f"{name}{TRUE}": Column(name, "J", at_work.get(name, f"{named.get(name, 'earlier elements')}, closed"))
+        for name in books
+    }
     columns["residual"] = Column("residual", "J", "residual")
     always = {"wall", "residual", *at_work}
 
-    def is_shown(known: Column, values: np.ndarray) -> bool:
-        finite = values[np.isfinite(values)]
-        return bool(len(finite)) and (known.name in always or bool(finite.min() < finite.max()))
+    def are_shown(columns: Sequence[Column], values: np.ndarray) -> np.ndarray:
+        finite = np.where(np.isfinite(values), values, np.nan)
+        least, greatest = np.fmin.reduce(finite, axis=1), np.fmax.reduce(finite, axis=1)
+        is_kept = np.array([known.name in always for known in columns])
+        return (least < greatest) | (is_kept & (least == greatest))
 
-    return "energy", [(history.energy, columns)], is_shown
+    return "energy", [(history.energy, columns)], are_shown
 
 
 def _books_at_work(history: History, books: list[str]) -> dict[str, str]:
@@ -121,7 +128,7 @@ def _books_at_work(history: History, books: list[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for kind in dict.fromkeys(element.name for _, element in elements):
         labels = [f"element {place}: {kind}" for place, element in elements if element.name == kind]
-        own = [name for name in books if _MAKING.sub("", name) == kind][-len(labels) :]
+        own = [name for name in books if kind_of(name) == kind][-len(labels) :]
         found |= dict(zip(own, labels, strict=False))
     return found
 

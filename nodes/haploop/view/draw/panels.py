@@ -13,7 +13,7 @@ import numpy as np
 from haploop.protocol.walls.registry import make_wall
 from haploop.protocol.walls.wall import Spring
 from haploop.view.draw.messages import Column, Table
-from haploop.view.draw.over_time import Interval, by_place, is_there, own_columns
+from haploop.view.draw.over_time import Interval, are_there, by_place, own_columns
 from haploop.view.look.budget import budget
 from haploop.view.look.compare import Changes, Half
 from haploop.view.look.spectrum import amplitudes, main_line
@@ -65,7 +65,7 @@ def _compare(look: Look) -> Sent:
 def _own(look: Look) -> Sent:
     """Returns what elements show beside their forces, a table for each unit."""
     parts = own_columns(look.history)
-    return [look.interval.table(f"own.{place}", [part], is_there) for place, part in enumerate(parts)], {}
+    return [look.interval.table(f"own.{place}", [part], are_there) for place, part in enumerate(parts)], {}
 
 
 def _last(history: History, series: LodSeries, first: int, end: int) -> tuple[int, int]:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from haploop.logger.books.ideal_wall import DISSIPATED
+from haploop.view.look.book_names import book_names
 from haploop.view.store.history import EARLIER, TRUE, WALL_BOOK, History
 
 # Books of the plant in the order in which they are told; all but these are named after themselves.
 _STORED = ("kinetic", "spring", "actuator")
-_LABELS = {"unmodelled_work": "hand, by what is left over", EARLIER: "earlier elements"}
+_LABELS = {"unmodelled_work": "hand, by what is left over", EARLIER.removesuffix(TRUE): "earlier elements"}
 # The wall's share by cause: label, the book it goes up to and the book it starts from; "" is nothing.
 _OF_WALL = (
     ("sampling and hold", "sampled_and_held", "ideal"),
@@ -40,7 +41,7 @@ def budget(history: History, from_tick: int, end: int) -> dict[str, Any] | None:
     rows = [
         {"name": label, "total_J": sum(sign * total[name] for sign, name in parts),
          "window_J": sum(sign * window[name] for sign, name in parts)}
-        for label, parts in _causes(names)
+        for label, parts in _causes(names, _LABELS | book_names(history))
     ]  # fmt: skip
     shown = [row for row in rows if np.isfinite(row["total_J"]) and np.isfinite(row["window_J"])]
     return {"from_s": first / rate, "to_s": (end - 1) / rate, "about_s": about / rate, "rows": shown}
@@ -55,11 +56,11 @@ def _at(series: Any, names: Sequence[str], tick: int) -> tuple[np.ndarray, int]:
     return np.nan_to_num(series.envelope(names, begin, begin + bucket, bucket)[:, 0], nan=0.0), bucket
 
 
-def _causes(names: Sequence[str]) -> Iterator[tuple[str, list[tuple[float, str]]]]:
-    """Yields each cause with the books that make it, and their signs."""
+def _causes(names: Sequence[str], labels: Mapping[str, str]) -> Iterator[tuple[str, list[tuple[float, str]]]]:
+    """Yields each cause with the books that make it, and their signs; ``labels`` by book, of those not told by name."""
     for name in names:
         if name.endswith("_work"):
-            yield _LABELS.get(name, name.removesuffix("_work")), [(-1.0, name)]
+            yield labels.get(name, name.removesuffix("_work")), [(-1.0, name)]
     has_wall = "ideal" in names
     by_law = [(-1.0, DISSIPATED)] if DISSIPATED in names else []
     for label, up_to, start in _OF_WALL if has_wall else ():
@@ -69,7 +70,7 @@ def _causes(names: Sequence[str]) -> Iterator[tuple[str, list[tuple[float, str]]
         yield "law of the wall", [(1.0, DISSIPATED)]
     for name in names:
         if name.endswith(TRUE) and name != WALL_BOOK:
-            yield _LABELS.get(name, name.removesuffix(TRUE)), [(1.0, name)]
+            yield labels[name.removesuffix(TRUE)], [(1.0, name)]
     for name in names:
         if name.endswith("_heat"):
             yield f"heat in {name.removesuffix('_heat')}", [(1.0, name)]

@@ -73,11 +73,12 @@ def _follows(one: Block, other: Block) -> bool:
 
 def _joined(run: list[Block], names: Iterable[str], shared: int = 0) -> dict[str, np.ndarray]:
     """Joins columns of blocks, but for the last bytes of all but the last, which a neighbour shares."""
-    columns = {}
-    for name in names:
-        *parts, last = [block["columns"][name] for block in run]
-        columns[name] = np.frombuffer(b"".join([*(part[: len(part) - shared] for part in parts), last]), "<f8")
-    return columns
+    *earlier, last = [block["columns"] for block in run]
+    until = -shared or None
+    return {
+        name: np.frombuffer(b"".join([*[columns[name][:until] for columns in earlier], last[name]]), "<f8")
+        for name in names
+    }
 
 
 def _plant(history: History, run: list[Block]) -> None:
@@ -158,11 +159,11 @@ class Backfill:
                 yield first, last, span.scene
 
     def reaches(self, live: History) -> bool:
-        """Tells whether the log has been read up to where a live history begins and still holds every row."""
+        """Tells whether the log has been read up to where a live history begins."""
         pairs = zip(self.history.all_series, live.all_series, strict=True)
         every_step = self._scene.run.log == "steps"
         return all(
-            its.first_tick is not None and own.end_tick >= max(its.first_tick, its.full_from_tick)
+            its.first_tick is not None and own.end_tick >= its.first_tick
             for own, its in pairs
             if every_step or own is not self.history.steps
         )

@@ -30,6 +30,8 @@ _STATE_S = 0.4
 _LONGEST_REASON = 120
 _FEWEST_POINTS, _MOST_POINTS = 50, 8000
 _LONGEST_S = 1e9
+# What stands beside the charts over time comes with one snapshot of so many: it is read more than watched.
+_BESIDE_EVERY = 3
 # Snapshots that go out before the page has drawn them.
 _MOST_UNDRAWN = 4
 # Commands that a page may send; the clock answers more.
@@ -48,7 +50,7 @@ class Page:
         self._sent_state: tuple[object, ...] | None = ()
         self._sent_events: tuple[object, ...] | None = ()
         self._sent_snapshot: tuple[object, ...] = ()
-        self._sent_beside = False
+        self._until_beside = 0
         self._undrawn = 0
         self._sent_listing: Message = {}
 
@@ -77,7 +79,7 @@ class Page:
                 await self._send_snapshot()
             return
         if isinstance(message, Viewport):
-            self._viewport, self._sent_beside = message, False
+            self._viewport, self._until_beside = message, 0
             return
         try:
             ok, text = True, await self._carry_out(message)
@@ -133,10 +135,14 @@ class Page:
     async def _send_snapshot(self) -> None:
         if self._undrawn >= _MOST_UNDRAWN:
             return
-        beside = not self._sent_beside
-        made = self._viewer.snapshot(self._viewport, beside)
-        if made and (made[0] != self._sent_snapshot or beside):
-            self._sent_snapshot, self._sent_beside, self._undrawn = made[0], beside, self._undrawn + 1
+        made = self._viewer.snapshot(self._viewport, beside := self._until_beside == 0)
+        if made and made[0] == self._sent_snapshot:
+            if self._until_beside == _BESIDE_EVERY - 1:
+                return
+            made, beside = self._viewer.snapshot(self._viewport, True), True  # the last picture is whole
+        if made:
+            self._sent_snapshot, self._undrawn = made[0], self._undrawn + 1
+            self._until_beside = (_BESIDE_EVERY if beside else self._until_beside) - 1
             await self._socket.send_bytes(made[1])
 
     async def _send(self, message: Message) -> None:

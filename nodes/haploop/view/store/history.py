@@ -61,6 +61,7 @@ class History:
         own: unit and label of each of these columns of elements, by name.
         energy: at ticks: the true book of the wall and of each element (``<name>.true``; ``earlier.true`` is the sum of
             those that are not kept apart), the plant's books, those that part the wall's by cause, and the residual.
+        opened: tick at which each column of ``energy`` began; None where it may have begun before what is known.
         at_work: at the newest ticks of the controller.
         stop_tick: tick at which the plant has ended; None before.
         version: changes with every row that is appended.
@@ -75,6 +76,7 @@ class History:
         self.all_series = self.steps, self.ticks, self.energy
         self.at_work = AtWork()
         self.own: dict[str, tuple[str, str]] = {}
+        self.opened: dict[str, int | None] = {}
         self.stop_tick: int | None = None
         self.version = 0
         self._end_state: dict[str, np.ndarray] = {}
@@ -146,6 +148,10 @@ class History:
         kept = {name: column for name, column in columns.items() if name not in earlier}
         if earlier:
             kept[EARLIER] = np.nansum([columns[name] for name in earlier], axis=0)
+        for name in kept.keys() - self.opened.keys():
+            known = int(np.isfinite(kept[name]).argmax())
+            goes_on = bool(self.energy.names) and self.energy.end_tick == tick
+            self.opened[name] = tick + known if known or goes_on or not tick else None
         self._append(self.energy, tick, kept)
 
     def extend_from(self, other: History) -> None:
@@ -154,6 +160,7 @@ class History:
             own.extend_from(its)
         if other.ticks.first_tick is not None:
             self.at_work, self.own = other.at_work, self.own | other.own
+        self.opened = {**other.opened, **self.opened}
         self._end_state = other._end_state
         self.stop_tick = other.stop_tick if self.stop_tick is None else self.stop_tick
         self.version += other.version + 1

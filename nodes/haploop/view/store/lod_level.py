@@ -68,6 +68,12 @@ class Ring:
         first, end = max(first, self.start), min(end, self.end)
         return self._values[:, first - self.start : max(first, end) - self.start]
 
+    def forget(self, number: int) -> None:
+        """Forgets the values before this number."""
+        if number > self.start:
+            self._values[:, : self.end - number] = self._values[:, number - self.start : self.end - self.start].copy()
+            self.start = number
+
     def grow(self, columns: int) -> None:
         """Adds columns up to this number; their values so far are NaN."""
         more = np.full((columns - len(self._values), self._values.shape[1]), np.nan)

@@ -16,6 +16,8 @@ _LEAST_ROWS = 4
 _BUCKETS = 4096
 # Ticks for which buckets are made at once, and buckets of the coarser levels; fewer are not worth the calls.
 _AT_ONCE_TICKS, _AT_ONCE_BUCKETS = 128, 8
+# Ticks of ranges that are taken from another series at once.
+_RANGES_AT_ONCE = 4096
 # Columns that are kept, at most: elements come and go.
 MOST_COLUMNS = 48
 
@@ -38,6 +40,7 @@ class LodSeries:
         self.rows_per_tick, self.origin = rows_per_tick, origin
         self.first_tick: int | None = None
         self._columns: dict[str, int] = {}
+        self._found: dict[tuple[str, ...], tuple[list[int], np.ndarray]] = {}
         self._levels = [LodLevel(Ring(recent_ticks * rows_per_tick, 0), 1, rows_per_tick)]
         self._add_level()
         # No level is given more at once than half of what it surely holds, so that nothing is lost on the way up.
@@ -89,6 +92,7 @@ class LodSeries:
 
     def _open(self, name: str, present: Collection[str]) -> None:
         """Adds a column; where there are too many, in place of the oldest that is not present any more."""
+        self._found.clear()
         if len(self._columns) < MOST_COLUMNS:
             self._columns[name] = len(self._columns)
             for level in self._levels:
@@ -121,36 +125,67 @@ class LodSeries:
             self._propagate(depth + 1)
 
     def extend_from(self, other: LodSeries) -> None:
-        """Appends what another series holds in full and this one has not reached."""
-        first, end = max(self.end_tick, other.full_from_tick), other.end_tick
-        if first < end:
-            rows = other.rows(other.names, first, end)
-            self.append(first, dict(zip(other.names, rows, strict=True)))
+        """Appends what another series holds and this one has not reached.
+
+        Of what that holds as ranges only, least and greatest of an interval stand in it by turns, and all before its
+        end counts as ranges here, too.
+        """
+        n, begun = (
+            self.rows_per_tick,
+            self.end_tick if other.first_tick is None else max(self.end_tick, other.first_tick),
+        )
+        full = max(begun, other.full_from_tick)
+        if begun < full:
+            bucket = other.bucket_from(begun, 1)
+            full = min(full + (other.origin - full) % bucket, other.end_tick)
+            for tick in range(begun, full, _RANGES_AT_ONCE):
+                end, first = min(tick + _RANGES_AT_ONCE, full), other.aligned(tick, bucket)
+                pairs = other.envelope(other.names, first, end + (first - end) % bucket, bucket)
+                at = np.arange((tick - first) * n, (end - first) * n)
+                rows = pairs[:, 2 * (at // (bucket * n)) + at % 2]
+                self.append(tick, dict(zip(other.names, rows, strict=True)))
+        if full < other.end_tick:
+            rows = other.rows(other.names, full, other.end_tick)
+            self.append(full, dict(zip(other.names, rows, strict=True)))
+        if begun < full:
+            self._levels[0].ring.forget((full - self.origin) * n)
 
     def rows(self, names: Sequence[str], from_tick: int, to_tick: int) -> np.ndarray:
         """Returns the rows in full between two ticks, shape (names, rows); NaN where there are none."""
         level, n = self._levels[0], self.rows_per_tick
+        begin, now = self.full_from_tick, self.end_tick
+        if begin <= from_tick <= to_tick <= now:
+            return self._picked(level.between(from_tick - self.origin, to_tick - self.origin), names)
         found = np.full((len(names), (to_tick - from_tick) * n), np.nan)
-        first, end = max(from_tick, self.full_from_tick), min(to_tick, self.end_tick)
+        first, end = max(from_tick, begin), min(to_tick, now)
         if first < end:
             values = level.between(first - self.origin, end - self.origin)
-            self._pick(values, names, found[:, (first - from_tick) * n : (end - from_tick) * n])
+            found[:, (first - from_tick) * n : (end - from_tick) * n] = self._picked(values, names)
         return found
 
-    def _pick(self, values: np.ndarray, names: Sequence[str], into: np.ndarray, group: int = 0) -> None:
-        """Copies columns by name, reduced to the extremes of every ``group`` values unless it is 0."""
-        known = [(row, self._columns[name]) for row, name in enumerate(names) if name in self._columns]
-        if group and known:
-            values = extremes(values[[place for _, place in known]], group)
-            known = [(row, place) for place, (row, _) in enumerate(known)]
-        for row, place in known:
-            into[row] = values[place]
+    def _picked(self, values: np.ndarray, names: Sequence[str], group: int = 0) -> np.ndarray:
+        """Returns columns by name, NaN where unknown; as extremes of every ``group`` values unless it is 0."""
+        rows, places = self._places(names)
+        picked = extremes(values[places], group) if group else values[places]
+        if len(picked) == len(names):
+            return picked
+        found = np.full((len(names), picked.shape[1]), np.nan)
+        found[rows] = picked
+        return found
+
+    def _places(self, names: Sequence[str]) -> tuple[list[int], np.ndarray]:
+        """Returns where among these names those are that are known, and their columns' places; kept, for speed."""
+        if (key := tuple(names)) not in self._found:
+            rows = [row for row, name in enumerate(names) if name in self._columns]
+            self._found[key] = rows, np.array([self._columns[names[row]] for row in rows], dtype=np.intp)
+        return self._found[key]
 
     def bucket_from(self, from_tick: int, bucket_ticks: int) -> int:
         """Returns the ticks of a bucket for :meth:`envelope`: ``bucket_ticks``, or more where the past is coarser."""
-        fine = (level for level in self._levels if level.ticks <= bucket_ticks)
-        if any(level.start <= self.aligned(from_tick, bucket_ticks) - self.origin for level in fine):
-            return bucket_ticks
+        begin = self.aligned(from_tick, bucket_ticks) - self.origin
+        for level in reversed(self._levels):
+            if level.ticks <= bucket_ticks and level.start <= begin:
+                return bucket_ticks
         return self.bucket_from(from_tick, 2 * bucket_ticks)
 
     def aligned(self, tick: int, bucket_ticks: int) -> int:
@@ -170,21 +205,22 @@ class LodSeries:
         found = np.full((len(names), (to_tick - from_tick) // bucket_ticks * 2), np.nan)
         at, end, filled = from_tick - self.origin, min(to_tick, self.end_tick) - self.origin, 0
         # From the coarsest level that is fine enough on; what has not been propagated to it comes from the finer ones.
-        levels = [level for level in reversed(self._levels) if level.ticks <= bucket_ticks]
-        for level in levels:
-            buckets = max(0, min(level.end, end) - at) // bucket_ticks
-            if buckets:
+        levels = [(level, level.end) for level in reversed(self._levels) if level.ticks <= bucket_ticks]
+        for level, known in levels:
+            buckets = (min(known, end) - at) // bucket_ticks
+            if buckets > 0:
                 values = level.between(at, at + buckets * bucket_ticks)
                 group = bucket_ticks // level.ticks * level.values
                 done = level is not self._levels[0] and group == 2
-                self._pick(values, names, found[:, filled : filled + 2 * buckets], 0 if done else group)
+                found[:, filled : filled + 2 * buckets] = self._picked(values, names, 0 if done else group)
                 at, filled = at + buckets * bucket_ticks, filled + 2 * buckets
         rest = []
-        for level in levels:
-            until = min(level.end, end // level.ticks * level.ticks)
-            rest += [level.between(at, until)] if until > at else []
-            at = max(at, until)
+        for level, known in levels:
+            until = min(known, end // level.ticks * level.ticks)
+            if until > at:
+                rest.append(level.between(at, until))
+                at = until
         if rest:
             values = np.concatenate(rest, axis=1)
-            self._pick(values, names, found[:, filled : filled + 2], values.shape[1])
+            found[:, filled : filled + 2] = self._picked(values, names, values.shape[1])
         return found

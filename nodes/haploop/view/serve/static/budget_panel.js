@@ -49,6 +49,8 @@ export class BudgetPanel {
       this.rows.get(name).row.remove();
       this.rows.delete(name);
     }
+    const inOrder = rows.map(({ name }) => this.rows.get(name).row);
+    if (inOrder.some((row, i) => this.list.children[i] !== row)) this.list.append(...inOrder);
     put(this.note, this.words(from, to, about));
   }
 
