@@ -85,10 +85,11 @@ def difference_table(found: Difference) -> RenderableType:
 
     from haploop.tools.figure.data import TOGETHER
     from haploop.tools.figure.difference import scene_value
+    from haploop.tools.figure.run_names import shortened
     from haploop.tools.render.terminal import make_table, verdict_style
     from haploop.tools.render.units import amount
 
-    table = make_table("", *found.runs, unbroken=("",))
+    table = make_table("", *shortened(found.runs), unbroken=("",))
     if found.names[0] != found.names[1]:
         table.add_row("title", *(Text(name, "bold") for name in found.names))
         table.add_section()

@@ -12,7 +12,7 @@ from haploop.tools.figure import style
 from haploop.tools.figure.data import Book, FigureError, RunData
 from haploop.tools.figure.run_figure import badge, key_numbers
 from haploop.tools.figure.run_labels import labels
-from haploop.tools.figure.run_names import run_names
+from haploop.tools.figure.run_names import run_names, shortened
 from haploop.tools.figure.time import MM, line
 from haploop.tools.render.units import amount, prefix_for
 
@@ -45,7 +45,7 @@ def draw_overlay(directories: Sequence[Path], target: Path | None = None) -> Pat
         )
     runs = [RunData.from_directory(directory) for directory in directories]
     others = "_".join(directory.resolve().name for directory in directories[1:])
-    figure = make_overlay(runs, run_names(directories))
+    figure = make_overlay(runs, shortened(run_names(directories)))
     return style.write_figure(figure, target or directories[0] / f"with_{others[:_LONGEST_NAME]}.png")
 
 

@@ -23,7 +23,7 @@ def run_names(directories: Sequence[Path]) -> list[str]:
     depth = 1
     while len({path.parts[-depth:] for path in unlike}) < len(unlike):
         depth += 1
-    tails = _shortened(["/".join(path.parts[-depth:]).replace("//", "/") for path in unlike])
+    tails = ["/".join(path.parts[-depth:]).replace("//", "/") for path in unlike]
     name_of, seen, names = dict(zip(unlike, tails, strict=True)), Counter[Path](), list[str]()
     for path in whole:
         seen[path] += 1
@@ -31,7 +31,7 @@ def run_names(directories: Sequence[Path]) -> list[str]:
     return names
 
 
-def _shortened(names: list[str]) -> list[str]:
+def shortened(names: Sequence[str]) -> list[str]:
     """Returns long names without the words that all of these begin with; whole where that leaves two the same."""
     long = [name for name in names if len(name) > _LONG]
     alike = takewhile(lambda letters: len({*letters}) == 1, zip(*long, strict=False)) if len(long) > 1 else ()
@@ -39,4 +39,4 @@ def _shortened(names: list[str]) -> list[str]:
     cut, half = max(common.rfind(separator) for separator in _SEPARATORS) + 1, _LONG // 2
     short = [f"{_CUT}{name[cut:]}" if cut and name in long else name for name in names]
     short = [name if len(name) <= _LONG else f"{name[: half - 1]}{_CUT}{name[-half:]}" for name in short]
-    return short if len({*short}) == len(short) else names
+    return short if len({*short}) == len(short) else [*names]
