@@ -79,8 +79,9 @@ docs: $(READY) ## make the documentation as a site in site/ (index.html); a warn
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo 'site/index.html (to search it, too: python3 -m http.server -d site)'
 
-pictures: $(READY) ## make the pictures of README's walk anew (two minutes)
+pictures: $(READY) ## make the pictures of README's walk anew (two minutes; that of the page needs Chromium)
 	@$(BIN)/python docs/site/pictures.py docs/pictures
+	@$(BIN)/python docs/site/page_picture.py docs/view.png
 
 notebook: $(READY) ## run docs/notebook.ipynb anew and keep its figures
 	@$(BIN)/python -m haploop.tools.notebook docs/notebook.ipynb
