@@ -121,6 +121,8 @@ def test_the_close_view_is_of_a_time_of_which_the_plant_was_logged(runs: dict[st
     assert data.close_s()[0] > 1.1
     first, last = replace(data, t_s=data.t_s[data.t_s < 1.1]).close_s()
     assert first < 1.1 <= last + 0.2
+    first, last = replace(data, t_s=data.t_s[data.t_s < 0.05]).close_s()
+    assert first < 0.05 < last < 0.052, "without contact so far"
 
 
 def test_a_change_that_was_refused_leaves_history_as_it_was() -> None:

@@ -198,10 +198,12 @@ class RunData:
     def close_s(self) -> tuple[float, float]:
         """Returns the time of the close view: the last contact, or the end of a run without any."""
         first, last = self.span_s
-        # Of a run that failed the log of the controller may go on beyond that of the plant.
+        # Of a run that failed, or was killed, the log of the controller may go on beyond that of the plant.
+        moves_until = float(self.t_s.max(initial=first))
         contact = self.contact_s()
-        contact = contact[contact <= self.t_s.max(initial=first)]
+        contact = contact[contact <= moves_until]
         if not len(contact):
+            last = min(last, moves_until + 1 / self.control_rate)
             return max(first, last - _CLOSE_S), last
         recent = contact[contact > contact[-1] - _CLOSE_S]
         margin = 0.05 * (recent[-1] - recent[0]) + 0.002
