@@ -8,6 +8,7 @@ import math
 import platform
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -52,10 +53,15 @@ def note_accounts(accounts: dict[int, Account], elements: Iterable[Description],
 
 def versions() -> dict[str, str]:
     """Returns the versions of what the run was made with."""
+    return {**_packages(), "python": platform.python_version()}
+
+
+@cache
+def _packages() -> dict[str, str]:
+    """Returns the versions of packages; each is searched for among all that are installed, 1 ms or more."""
     from importlib.metadata import version  # which takes a tenth of the logger's start
 
-    packages = {name: version(name) for name in ("haploop", "numpy", "pyzmq", "msgpack")}
-    return {**packages, "python": platform.python_version()}
+    return {name: version(name) for name in ("haploop", "numpy", "pyzmq", "msgpack")}
 
 
 def energy(books: BooksState, accounts: Sequence[Account], has_wall: bool) -> Summary:
