@@ -9,8 +9,9 @@ function projection(u) {
   return { x0: x.min, kx: width / (x.max - x.min), left, y1: y.max, ky: height / (y.max - y.min), top };
 }
 
-// A point nearer than this to the one before it, in pixels along both axes together, is passed over.
-const NEAR_PX = 0.6;
+// A line passes its points at so many pixels at most, and goes through every peak of what is steep: what lies straight is
+// drawn at one stroke, since most of a picture's time goes into the bends of its lines.
+const NEAR_PX = 0.25;
 
 /**
  * A line through all points, or through those alone that `drawn` is true of: a stretch goes on to the point after it.
@@ -20,27 +21,51 @@ const NEAR_PX = 0.6;
 export function line(u, xs, ys, drawn) {
   const { x0, kx, left, y1, ky, top } = projection(u);
   const path = new Path2D();
-  let [pen, x, y] = [false, 0, 0];
+  // From the last bend at x, y the line goes on to what is held, as long as its slope is between these two.
+  let [pen, x, y, holds, heldX, heldY, low, high] = [false, 0, 0, false, 0, 0, 0, 0];
+  const bend = () => {
+    if (holds) path.lineTo(heldX, heldY);
+    if (holds) [x, y] = [heldX, heldY];
+    holds = false;
+  };
   for (let i = 0; i < xs.length; i++) {
     const px = left + (xs[i] - x0) * kx;
     const py = top + (y1 - ys[i]) * ky;
     if (!(px - px + py - py === 0)) {
+      bend();
       pen = false;
       continue;
     }
     const goesOn = drawn ? drawn(i) : true;
-    if (pen && goesOn && Math.abs(px - x) + Math.abs(py - y) < NEAR_PX) continue;
-    if (pen) path.lineTo(px, py);
-    else path.moveTo(px, py);
+    if (pen) {
+      const slope = (py - y) / (px - x);
+      const isPeak = Math.abs(slope) > 1 && (py - heldY) * (heldY - y) < 0;
+      if (holds && !(px > heldX && slope >= low && slope <= high && !isPeak)) bend();
+      const dx = px - x;
+      if (dx > 0) {
+        const near = NEAR_PX * Math.hypot(1, (py - y) / dx);
+        const [least, most] = [(py - near - y) / dx, (py + near - y) / dx];
+        [low, high] = holds ? [Math.max(low, least), Math.min(high, most)] : [least, most];
+        [holds, heldX, heldY] = [true, px, py];
+      } else {
+        path.lineTo(px, py);
+        [x, y] = [px, py];
+      }
+      if (!goesOn) bend();
+    } else {
+      path.moveTo(px, py);
+      [x, y] = [px, py];
+    }
     pen = goesOn;
-    x = px;
-    y = py;
   }
+  bend();
   return path;
 }
 
-// A line that goes up and down more than so many times the chart's height is rough, if it has a point a pixel or so.
+// A line that goes up and down more than so many times the chart's height is rough, if it has a point a pixel or so; a
+// fourth of that is enough where it turns every few pixels.
 const ROUGH = 50;
+const OFTEN_PX = 8;
 const POINTS_A_PIXEL = 0.6;
 // A strip this thick, in lines, or where strips fill this part of what they cover together, is filled faintly.
 const THICK = 4;
@@ -55,7 +80,7 @@ export function strips(u, xs, ys) {
   const { x0, kx, left, y1, ky, top } = projection(u);
   if (xs.length < POINTS_A_PIXEL * u.bbox.width) return null;
   const found = [];
-  let [at, low, high, y, way] = [NaN, 0, 0, NaN, 0];
+  let [at, low, high, y, way, turns, rise] = [NaN, 0, 0, NaN, 0, 0, 0];
   for (let i = 0; i < xs.length; i++) {
     const px = Math.round(left + (xs[i] - x0) * kx);
     const py = top + (y1 - ys[i]) * ky;
@@ -65,11 +90,16 @@ export function strips(u, xs, ys) {
       [at, low, high] = isThere ? [px, y < py ? y : py, y > py ? y : py] : [NaN, 0, 0];
     } else if (py < low) low = py;
     else if (py > high) high = py;
-    if (y === y && isThere) way += Math.abs(py - y);
+    if (y === y && isThere) {
+      way += Math.abs(py - y);
+      if ((py - y) * rise < 0) turns++;
+      if (py !== y) rise = py - y;
+    }
     y = isThere ? py : NaN;
   }
   if (at === at) found.push(at, 1, low, high);
-  return way > ROUGH * u.bbox.height ? found : null;
+  const isBusy = turns * OFTEN_PX * devicePixelRatio > u.bbox.width;
+  return way > (isBusy ? ROUGH / 4 : ROUGH) * u.bbox.height ? found : null;
 }
 
 // Strips are drawn on a sheet of their own, which is laid on the chart: a rectangle for each takes thrice as long.
