@@ -63,9 +63,9 @@ export function line(u, xs, ys, drawn) {
 }
 
 // A line that goes up and down more than so many times the chart's height is rough, if it has a point a pixel or so; a
-// fourth of that is enough where it turns every few pixels.
+// fourth of that is enough where it turns every third pixel.
 const ROUGH = 50;
-const OFTEN_PX = 8;
+const OFTEN_PX = 3;
 const POINTS_A_PIXEL = 0.6;
 // A strip this thick, in lines, or where strips fill this part of what they cover together, is filled faintly.
 const THICK = 4;
