@@ -132,6 +132,14 @@ def test_growth_and_decay_have_words_of_their_own():
     assert seen(lambda t: np.where(t > 2.9, np.nan, -1e-3)).word == "not finite"
 
 
+def test_a_swing_that_is_over_is_no_longer_told():
+    found = seen(lambda t: -5e-3 + np.where(t < 2.45, 1e-3 * np.sin(2 * np.pi * 30 * t), 0.0))
+    assert (found.word, found.oscillation_m, found.frequency_Hz) == ("no swing seen", 0.0, None)
+    assert "In the last 0.5 s the position stayed within 0 µm" in found.why
+    moves_yet = seen(lambda t: -5e-3 + np.where(t < 2.55, 1e-3 * np.sin(2 * np.pi * 30 * t), 0.0))
+    assert moves_yet.word == "dying away"
+
+
 def recorded(tmp_path, **values):
     """The history of a run of 3 s, and its summary."""
     loaded = load("fig6c").set({"duration": 3.0, **values})

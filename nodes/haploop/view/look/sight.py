@@ -99,9 +99,10 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
         return Sight("not finite", _WHY["not finite"], first / rate, end / rate)
     swing_m = max(resolution_m, SMALLEST_SWING_M)
     (fast, fast_growth), (crossings, growth) = _swings(x, swing_m), _swings(slow, swing_m)
+    # Of a swing that is over the newest window knows nothing, though a longer look back still holds it.
+    if fast >= CROSSINGS or np.ptp(x) <= swing_m:
+        crossings, growth, long_first, slow = fast, fast_growth, first, x[::n]
     seen_s = (end - long_first) / rate
-    if fast >= CROSSINGS:
-        crossings, growth, seen_s = fast, fast_growth, (end - first) / rate
     width, ripple = float(np.ptp(slow)), float(np.ptp(_flat(force)))
     if not inside[-window:].any():
         word = "no contact"
