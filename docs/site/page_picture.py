@@ -44,6 +44,9 @@ def make(target: Path) -> None:
                 page.click("[data-panel=energy]")
                 expect(page.locator("#time")).to_contain_text(f"{TICKS / 1000:.3f}", timeout=PATIENCE_MS)
                 expect(page.locator("#budget")).to_contain_text("damping", timeout=PATIENCE_MS)
+                for row in range(4):
+                    expect(page.locator("#nodes tr").nth(row)).to_contain_text(f"{TICKS}", timeout=PATIENCE_MS)
+                expect(page.locator("#swap-element")).to_contain_text("0: damping", timeout=PATIENCE_MS)
                 page.wait_for_timeout(1500)  # texts come a few times a second
                 page.screenshot(path=target)
                 with Image.open(target) as picture:
