@@ -1,4 +1,4 @@
-"""How wide a recorded buzz is, when it was, and what power a force gave to it, against what is known of each."""
+"""Width, begin and end of a recorded buzz, and the power that a force gave to it, against what is known of each."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ ROLES = tuple(PROCESSES)
 
 
 def first_and_slowly(*values: Any) -> list[Any]:
-    """Parameters of a test, of which all but the first are left to the slow tests."""
+    """Parameters of a test, of which all but the first are left to the slow tests; a tuple is several parameters."""
     rest = [value if isinstance(value, tuple) else (value,) for value in values[1:]]
     return [values[0], *(pytest.param(*value, marks=pytest.mark.slow) for value in rest)]
 

@@ -1,4 +1,4 @@
-"""What a recorded force gives to a swing."""
+"""Mean power that a recorded force gives to a swing, by the lines of their spectra."""
 
 from __future__ import annotations
 
