@@ -40,6 +40,7 @@ def judged(loop, wall: Tried, corner):
     return judge_scene(replace(scene, wall=held, dissipation=wall.elements), KINDS)
 
 
+@pytest.mark.slow
 def test_a_corner_of_a_fifth_less_friction_at_three_times_the_hold_refuses_the_wall_that_was_once_advised(loop):
     with Trial(Store()) as trial:
         [once] = trial.failures(loop, [ONCE], [Case(3.0, LESS_FRICTION)])

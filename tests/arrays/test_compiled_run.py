@@ -15,7 +15,7 @@ from haploop.launch.batch.jax.run import compiled_results, compiling
 from haploop.launch.batch.run import run_batch
 from helpers.live.launched import first_and_slowly
 from helpers.runs.batches import PUSH, Stiffening, alone, pressed, with_element
-from helpers.runs.compiled import agree, compiled, jax, many
+from helpers.runs.compiled import agree, compiled, many
 from helpers.scenes.least import KINDS
 
 
@@ -28,6 +28,8 @@ def test_results_are_those_of_arrays_but_for_the_last_digits() -> None:
 
 @pytest.mark.slow
 def test_a_program_serves_all_scenes_of_its_structure_and_jax_stays_as_it_was() -> None:
+    import jax
+
     compiled(many(16))
     count = compiling()[0]
     others = many(29, device={"mass": 0.02, "damping": 0.2})
@@ -47,6 +49,8 @@ def test_a_program_serves_all_scenes_of_its_structure_and_jax_stays_as_it_was() 
 @pytest.mark.slow
 def test_loops_show_nothing_of_those_whose_memory_they_take_over(duration: float, diverged_beyond: float) -> None:
     """Few ticks, the last half second, a divergence; the memory comes full of what is no number."""
+    import jax
+
     from haploop.launch.batch.jax.programs import PROGRAMS, in_double
 
     scenes = many(16, duration=duration, diverged_beyond=diverged_beyond)
@@ -62,6 +66,8 @@ def test_loops_show_nothing_of_those_whose_memory_they_take_over(duration: float
 @pytest.mark.slow
 def test_put_together_for_a_gpu_the_loops_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its program is another, and all of it has a form for CUDA; where there is no GPU, the CPU runs it."""
+    import jax
+
     from haploop.launch.batch.jax import programs
 
     class Programs(programs.Programs):
@@ -83,6 +89,8 @@ def test_workers_share_the_memory_of_a_gpu_unless_the_user_says_otherwise(
     monkeypatch: pytest.MonkeyPatch, of_the_user: str | None
 ) -> None:
     """jax reads the variable when it first looks for a GPU; outside that moment the environment is the user's."""
+    import jax
+
     from haploop.launch.batch.jax import programs
 
     name, seen = "XLA_PYTHON_CLIENT_PREALLOCATE", []

@@ -10,6 +10,7 @@ from haploop.protocol.ticks import Timebase
 from helpers.runs.compiled import agree
 
 
+@pytest.mark.slow
 def test_windows_read_by_a_program_show_what_they_show_by_themselves() -> None:
     """Of signals that drift, rest and swing, in and out of contact, whatever the place in the rings where they end."""
     from haploop.launch.batch.jax.block import Rings

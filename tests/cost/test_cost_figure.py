@@ -146,6 +146,7 @@ def test_the_tolerance_is_drawn_and_the_signs_are_explained(figure: Any, cost: C
     assert cost.machine in artists(figure, "words")[0].get_text()
 
 
+@pytest.mark.slow
 def test_one_scene_or_an_unknown_method_draws_too(cost: Cost, tmp_path: Path) -> None:
     other = dataclasses.replace(fake_point("stick_slip", "rk4", 5000), method="leapfrog")
     scene = dataclasses.replace(cost.scenes[2], points=[*cost.scenes[2].points, other])
@@ -153,6 +154,7 @@ def test_one_scene_or_an_unknown_method_draws_too(cost: Cost, tmp_path: Path) ->
     assert target.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_a_figure_whose_name_has_no_suffix_is_a_png(figure: Any, tmp_path: Path) -> None:
     assert write_figure(figure, tmp_path / "cost") == tmp_path / "cost.png"
     assert (tmp_path / "cost.png").read_bytes().startswith(b"\x89PNG")

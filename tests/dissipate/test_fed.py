@@ -90,6 +90,7 @@ def test_without_a_force_nothing_is_said_of_what_feeds_the_buzz(tmp_path: Path) 
     assert "this swing" not in shown(make_report(found), 400)
 
 
+@pytest.mark.slow
 def test_what_a_log_says_of_a_swing_that_lasts_is_the_slope_of_its_own_book(tmp_path: Path) -> None:
     """Late by 2 ms and with an actuator that lags: what the plant's steps hold counts, not what was commanded."""
     layers = read_layers(bundled("scenes")["demo"])

@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
+import scipy
 
 from haploop.protocol.scene.effects import Accelerometer
 from haploop.protocol.scene.scene import Hand, Scene
@@ -183,7 +183,7 @@ class Bodies:
         return self._solved(duration, forces, None).y[:, -1].copy()
 
     def _solved(self, duration: float, forces: tuple[float, float, float], events: list[Any] | None) -> Any:
-        solved = solve_ivp(
+        solved = scipy.integrate.solve_ivp(
             self.rates, (0.0, duration), self.z, "DOP853", events=events, args=forces, rtol=1e-12, atol=1e-16
         )
         assert solved.success, solved.message

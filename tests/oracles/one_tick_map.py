@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 from scipy.linalg import expm
-from scipy.optimize import root_scalar
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +69,7 @@ class OneTickMap(ABC):
         stiffness = 1e-3
         while self.growth(stiffness * 1.1) < 1.0:
             stiffness *= 1.1
-        found = root_scalar(
+        found = scipy.optimize.root_scalar(
             lambda k: self.growth(k) - 1.0, bracket=(stiffness, stiffness * 1.1), xtol=1e-12, rtol=1e-14
         )
         return float(found.root)

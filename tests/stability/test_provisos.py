@@ -161,9 +161,10 @@ SWAYING: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stiffness", "word", "there"),
-    [(3500.0, "undecided", "swings on"), pytest.param(60.0, "steady", "rests", marks=pytest.mark.slow)],
+    [(3500.0, "undecided", "swings on"), (60.0, "steady", "rests")],
 )
 def test_a_wall_that_rests_at_the_lightest_hold_of_a_hand_is_steady_only_if_it_rests_at_the_hardest_too(
     stiffness, word, there

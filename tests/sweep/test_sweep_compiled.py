@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 from helpers.scenes.sweep_files import GRID, swept
 
-pytest.importorskip("jax")
+if not find_spec("jax"):
+    pytest.skip("JAX is not installed", allow_module_level=True)
 
 
 @pytest.mark.slow

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
+import scipy
 from mpmath import mp, mpf
-from scipy.integrate import solve_ivp
 
 from haploop.protocol.scene.scene import Scene
 from oracles.continuous.bodies import (
@@ -207,7 +207,7 @@ class IntegratedPlant(StickSlipPlant[np.ndarray]):
 
     def _solved(self, length: float, event: Any) -> Any:
         rates = self._rates[self.is_stuck]
-        solved = solve_ivp(
+        solved = scipy.integrate.solve_ivp(
             lambda _t, w: rates @ w, (0.0, length), self.w, "DOP853", events=event, rtol=_RELATIVE, atol=_ABSOLUTE,
             max_step=length / 4.0,
         )  # fmt: skip

@@ -21,7 +21,8 @@ def test_the_books_close_to_1e_12_in_every_combination_of_effects(effects):
     assert all(np.isfinite(column).all() for column in ran.plant.values())
 
 
-@pytest.mark.parametrize("effects", [tuple(EFFECTS)[:4], *slowly([tuple(EFFECTS)])], ids="+".join)
+@pytest.mark.slow
+@pytest.mark.parametrize("effects", [tuple(EFFECTS)[:4], tuple(EFFECTS)], ids="+".join)
 def test_every_heat_and_work_is_that_of_an_independent_integration(effects):
     tapped = tap(effects)
     ran = run(tapped)

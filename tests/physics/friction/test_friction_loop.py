@@ -11,7 +11,6 @@ import pytest
 
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Scene
-from helpers.live.launched import first_and_slowly
 from helpers.runs.captured import run
 from helpers.scenes.effect_tables import slowly
 from helpers.scenes.least import scene
@@ -122,6 +121,7 @@ def test_a_wall_within_the_bound_of_damping_and_friction_never_throws_the_device
     assert not ran.plant["v"][-1000:].any()
 
 
+@pytest.mark.slow
 def test_far_beyond_that_bound_a_device_is_thrown_back_faster_or_never_rests():
     thrown = [thrown_at_the_wall(seed, of_limit=60.0) for seed in range(6)]
     assert any(kinetic_rise_J(ran) > 0.01 or ran.plant["v"][-1000:].any() for ran in thrown)
@@ -144,7 +144,8 @@ def pushed_to_and_fro(shape: str) -> Scene:
     )
 
 
-@pytest.mark.parametrize("shape", first_and_slowly("kinetic", "breakaway"))
+@pytest.mark.slow
+@pytest.mark.parametrize("shape", ["kinetic", "breakaway"])
 def test_motion_with_stops_and_slips_is_that_of_the_reference(shape):
     pushed = pushed_to_and_fro(shape)
     ran, truth = run(pushed), follow(pushed, [0.0] * 2000)

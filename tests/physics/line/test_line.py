@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
 
 from haploop.plant.counters import DROPPED, LOST
 from haploop.plant.line import Line
@@ -181,20 +181,20 @@ def test_uniform_jitter_is_every_step_up_to_the_most_equally_often():
     delays = taken(make_jitter(effects.UniformJitter(most=0.0012), 1, 10_000))
     counts = np.bincount(delays)
     assert len(counts) == 13
-    assert stats.chisquare(counts).pvalue > 1e-6
+    assert scipy.stats.chisquare(counts).pvalue > 1e-6
 
 
 @pytest.mark.parametrize(("mean", "deviation"), [(0.002, 0.001), (0.001, 0.003), (0.01, 1e-5)])
 def test_gamma_jitter_has_its_mean_and_deviation_and_is_rounded_to_the_nearest_step(mean, deviation):
     """Every step against the integral of the density over half a step to either side."""
     delays = taken(make_jitter(effects.GammaJitter(mean=mean, deviation=deviation), 1, 10_000))
-    gamma = stats.gamma((mean / deviation) ** 2, scale=deviation**2 / mean * 10_000)
+    gamma = scipy.stats.gamma((mean / deviation) ** 2, scale=deviation**2 / mean * 10_000)
     steps = np.arange(delays.max() + 2)
     expected = MANY * (gamma.cdf(steps + 0.5) - gamma.cdf(np.maximum(steps - 0.5, 0.0)))
     counts = np.bincount(delays, minlength=len(steps))
     usual = expected > 20
     statistic = np.sum((counts[usual] - expected[usual]) ** 2 / expected[usual])
-    assert statistic < stats.chi2.isf(1e-6, max(1, usual.sum() - 1))
+    assert statistic < scipy.stats.chi2.isf(1e-6, max(1, usual.sum() - 1))
     assert counts[~usual].sum() == pytest.approx(expected[~usual].sum() + gamma.sf(steps[-1] + 0.5) * MANY, abs=60)
     if deviation > 2e-4:
         assert abs(delays.mean() / (mean * 1e4) - 1.0) < ERRORS * deviation / mean / math.sqrt(MANY) + 0.01
@@ -203,10 +203,10 @@ def test_gamma_jitter_has_its_mean_and_deviation_and_is_rounded_to_the_nearest_s
 @pytest.mark.parametrize("probability", [0.0, 0.01, 0.9, 1.0])
 def test_each_command_is_lost_by_itself_with_its_probability(probability):
     lost = taken(make_loss(effects.Loss(probability=probability), 1))
-    assert stats.binomtest(int(lost.sum()), MANY, probability).pvalue > 1e-6
+    assert scipy.stats.binomtest(int(lost.sum()), MANY, probability).pvalue > 1e-6
     after_a_loss = lost[1:][lost[:-1]]
     if len(after_a_loss):
-        assert stats.binomtest(int(after_a_loss.sum()), len(after_a_loss), probability).pvalue > 1e-6
+        assert scipy.stats.binomtest(int(after_a_loss.sum()), len(after_a_loss), probability).pvalue > 1e-6
 
 
 LONG = PRESSED | {"duration": 0.4}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
 from haploop.plant.motion.transition import (
@@ -117,7 +117,7 @@ def test_heat_of_a_stiff_step_is_what_adaptive_quadrature_gives(case):
     mass, damping, stiffness, h = CASES[case]
     square, _ = motion_integrals(mass, damping, stiffness, h)
     outer = lambda t: np.outer(*[motion(case, np.eye(3), np.array([t]))[0]] * 2)  # noqa: E731
-    expected, _ = quad_vec(outer, 0, h, epsabs=0, epsrel=1e-12)
+    expected, _ = scipy.integrate.quad_vec(outer, 0, h, epsabs=0, epsrel=1e-12)
     assert np.abs(square - expected).max() <= 1e-11 * np.abs(expected).max()
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import integrate
 
 from haploop.plant.counters import CLIPPED
 from haploop.plant.sensing.accelerometer import Accelerometer
@@ -36,7 +36,7 @@ def readings(accelerations, seed: int = 1, **table: Any) -> tuple[np.ndarray, fl
 def test_the_noise_of_a_bandwidth_is_the_density_over_its_first_order_response(bandwidth):
     """Variance: the integral of D^2 / (1 + (f / B)^2) over all frequencies; correlation e^{-2 pi B T} over a tick."""
     noise, _ = readings([0.0] * MANY, noise_density=0.01, bandwidth=bandwidth)
-    variance, _ = integrate.quad(lambda f: 1e-4 / (1.0 + (f / bandwidth) ** 2), 0.0, math.inf)
+    variance, _ = scipy.integrate.quad(lambda f: 1e-4 / (1.0 + (f / bandwidth) ** 2), 0.0, math.inf)
     rho = math.exp(-math.tau * bandwidth * 1e-3)
     spread = math.sqrt((1.0 + rho**2) / (1.0 - rho**2) / MANY)
     assert abs(np.mean(noise**2) / variance - 1.0) < ERRORS * math.sqrt(2.0) * spread

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy import signal, stats
+import scipy
 
 from haploop.launch.runs.replay import replay
 from haploop.launch.runs.start import prepare
@@ -49,14 +49,14 @@ def test_the_autocorrelation_is_rho_to_the_distance(cutoff):
 def test_what_is_new_at_each_tick_is_white_and_normal(cutoff):
     n, rho = noise(cutoff), math.exp(-math.tau * cutoff * PERIOD_S)
     new = (n[1:] - rho * n[:-1]) / math.sqrt(1.0 - rho**2)
-    assert stats.kstest(new, stats.norm.cdf).pvalue > 1e-6
+    assert scipy.stats.kstest(new, scipy.stats.norm.cdf).pvalue > 1e-6
     assert abs(np.mean(new[1:] * new[:-1])) < ERRORS / math.sqrt(MANY)
 
 
 def test_the_spectrum_falls_to_half_at_the_cutoff():
     """Against 2 / (pi cutoff) / (1 + (f / cutoff)^2) per Hz, one-sided, far below half the tick rate."""
     cutoff, segment = 20.0, 2000
-    frequency, power = signal.welch(noise(cutoff), 1.0 / PERIOD_S, nperseg=segment)
+    frequency, power = scipy.signal.welch(noise(cutoff), 1.0 / PERIOD_S, nperseg=segment)
     averages = 2 * MANY / segment * 0.9  # of half-overlapping segments under Hann's window
     for f in (1.0, 5.0, 20.0, 40.0):
         expected = 2.0 / (math.pi * cutoff) / (1.0 + (f / cutoff) ** 2)

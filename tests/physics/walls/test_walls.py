@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+import scipy
 
 from haploop.launch.scene.file import load
 from haploop.logger.books.ideal_wall import dissipated
@@ -81,7 +81,7 @@ def test_in_continuous_time_a_mass_leaves_hunt_and_crossley_at_one_speed_whateve
         return state[0] if t > 1e-5 else 1.0
 
     setattr(is_left, "terminal", True)  # noqa: B010  scipy reads it there
-    found = solve_ivp(rates, (0.0, 1.0), [0.0, SPEED], "DOP853", events=is_left, rtol=1e-12, atol=1e-15)
+    found = scipy.integrate.solve_ivp(rates, (0.0, 1.0), [0.0, SPEED], "DOP853", events=is_left, rtol=1e-12, atol=1e-15)
     assert -found.y[1, -1] == pytest.approx(leaving_speed(SPEED, factor), rel=1e-8)
 
 
@@ -107,7 +107,7 @@ def test_sampled_it_leaves_faster_by_what_shrinks_with_the_period_and_the_books_
 def test_what_a_wall_stores_is_the_integral_of_what_it_pushes_at_rest(kind: str) -> None:
     law = make_wall(scene(wall={"kind": kind, "position": 0.0, "stiffness": 300.0, **OWN.get(kind, {})}).wall)
     for depth in (1e-4, 7e-4, 3.3e-3):
-        whole = quad(lambda p: float(law.held(p)), 0.0, depth, limit=400, epsabs=1e-15)[0]
+        whole = scipy.integrate.quad(lambda p: float(law.held(p)), 0.0, depth, limit=400, epsabs=1e-15)[0]
         assert law.stored(depth) == pytest.approx(whole, rel=1e-8)
         assert law.stored_between(1e-4, depth) == pytest.approx(law.stored(depth) - law.stored(1e-4), abs=1e-18)
         assert law.held(depth) == pytest.approx(law.push(depth, 0.0), rel=1e-14)
@@ -153,7 +153,7 @@ def test_what_a_law_takes_of_a_motion_is_the_integral_along_it_from_surface_to_s
 
     quarters = np.arange(1, 5) * np.pi / turn / 2.0
     edges = [t[0], *quarters[quarters < t[-1]], t[-1]]
-    whole = sum(quad(power_W, *ends)[0] for ends in pairwise(edges))
+    whole = sum(scipy.integrate.quad(power_W, *ends)[0] for ends in pairwise(edges))
     assert dissipated(law, x, v, step_s).sum() == pytest.approx(whole, rel=1e-7)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from scipy.integrate import quad
+import scipy
 
 from haploop.protocol.walls.registry import WALLS
 from helpers.runs.batches import alone
@@ -44,6 +44,6 @@ def test_the_pages_own_wall_is_one_whose_potential_is_that_of_its_force() -> Non
     found: dict[str, Any] = {}
     exec(compile(code, "walls.md", "exec", dont_inherit=True), found)
     wall = found["Bumper"](0.0, 500.0, -1.0, 0.004)
-    assert wall.stored(0.003) == pytest.approx(quad(wall.held, 0.0, 0.003)[0], rel=1e-12)
+    assert wall.stored(0.003) == pytest.approx(scipy.integrate.quad(wall.held, 0.0, 0.003)[0], rel=1e-12)
     assert wall.contact(-0.003, 0.0) == (True, pytest.approx(500.0 * 0.003 * (1 + 0.75**2)))
     assert wall.values() == {"position": 0.0, "stiffness": 500.0, "hardens_at": 0.004}
