@@ -25,8 +25,6 @@ from haploop.protocol.scene.scene import ElementTable, EventTable, Hand, Scene
 def hand_force_N(table: HandForce | None, t: float) -> float:
     """tau(t) of a ``[hand.force]`` table."""
     match table:
-        case None:
-            return 0.0
         case Constant():
             return table.value
         case Ramp():
@@ -46,6 +44,8 @@ def hand_force_N(table: HandForce | None, t: float) -> float:
                 if t <= t1:
                     return f0 + (f1 - f0) * (t - t0) / (t1 - t0)
             return points[-1][1]
+        case _:
+            return 0.0
 
 
 class Mechanics:

@@ -10,9 +10,10 @@ import zmq
 
 from haploop.controller.controller import Controller
 from haploop.controller.deadline import heed_deadline
-from haploop.controller.dissipation import ElementError, PluginError, registry
+from haploop.controller.dissipation import ElementError, registry
 from haploop.controller.dissipation.element import places_of
 from haploop.protocol.changes import Event, is_change, refusals_as_status
+from haploop.protocol.plugin_file import raised_in_file
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import BlockLength, Timebase
 from haploop.protocol.transport.clock_client import REPORT_MS, ClockClient
@@ -85,8 +86,9 @@ class ControllerNode:
                 self._schedule(client.take_events())
             try:
                 loop.answer(tick, controller.answer(samples))
-            except ElementError:
-                self._flush()
+            except Exception as error:
+                if isinstance(error, ElementError) or raised_in_file(error):
+                    self._flush()
                 raise
             client.keep_in_touch(end, "plant")
             tick, held = end, end - self._reported
@@ -128,8 +130,6 @@ def work(client: ClockClient, context: zmq.Context[zmq.Socket[bytes]], directory
         node = ControllerNode(client, context, directory)
         node.connect()
         return node.run()
-    except PluginError as error:
-        raise NodeError(str(error)) from error
     except ElementError as error:
         for file, line in places_of(error.__cause__):
             print(f'  File "{file}", line {line}: {getline(file, line).strip()}', file=sys.stderr)

@@ -1,7 +1,8 @@
 """A process in which a plugin is tried before anything depends on it: ``python -m haploop.controller.trial``.
 
 Stdin brings one JSON object a line, answered by one on what was stdout. ``source`` and ``origin`` of a file are
-answered by ``kinds``, the elements it declares; ``make``, a list of kinds and parameters, by ``made``; what fails by
+answered by ``kinds``, the elements it declares, and ``brings``, whether there is more in it; ``make``, a list of kinds
+and parameters, by ``made``; what fails by
 ``error``, a sentence. It ends with whoever started it, and has a limit on memory; the other side sets one on time.
 """
 
@@ -22,6 +23,7 @@ from haploop.controller.active_elements import make_element
 from haploop.controller.dissipation.element import ASKABLE, Element, ElementError, Motion, place_in, raised
 from haploop.controller.dissipation.registry import PluginError, load_source
 from haploop.controller.tick import as_number
+from haploop.protocol.installed import all_brought
 from haploop.protocol.quantity import MEANT
 from haploop.protocol.scene.scene import ElementTable
 from haploop.protocol.transport.prints import keep_prints
@@ -72,7 +74,12 @@ def _limit_memory() -> None:
 
 def _load(request: Reply, kinds: dict[str, type[Element]]) -> Reply:
     kinds.update(load_source(request["source"], request["origin"]))
-    return {"kinds": {kind: _declaration(element, request["origin"]) for kind, element in kinds.items()}}
+    for named in all_brought().values():
+        for name, made in named.items():
+            for key, (quantity, _) in made.parameters().items():
+                _check_unit(quantity.unit, f"{request['origin']}: {key} of {name}")
+    declared = {kind: _declaration(element, request["origin"]) for kind, element in kinds.items()}
+    return {"kinds": declared, "brings": bool(all_brought())}
 
 
 def _declaration(element: type[Element], origin: str) -> Reply:

@@ -15,6 +15,7 @@ from haploop.logger.log import LogError
 from haploop.logger.session import open_session
 from haploop.logger.summary import Summary
 from haploop.protocol.changes import refusals_as_status
+from haploop.protocol.plugin_file import bring_file
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.clock_client import REPORT_MS, Aborted, ClockClient
@@ -74,6 +75,8 @@ class LoggerNode:
         """Subscribes to plant and controller, takes their state, and reports to be ready."""
         self.out = out
         self._streams = Subscriber(self._context, {role: welcome["endpoints"][role] for role in _LISTENS})
+        for path in welcome["context"].get("brings", ()):
+            bring_file(Path(path))
         attachments = welcome["context"].get("attachments", {})
         scene, time = Scene.from_dict(welcome["scene"]), Timebase(**welcome["timebase"])
         self.session = open_session(scene, time, out, attachments, machine=self._machine)

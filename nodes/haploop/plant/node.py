@@ -7,6 +7,7 @@ from pathlib import Path
 import zmq
 
 from haploop.plant.plant import Plant
+from haploop.protocol.plugin_file import bring_file
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import HELD_S, BlockLength, Timebase
 from haploop.protocol.transport.clock_client import ClockClient
@@ -33,6 +34,8 @@ class PlantNode:
         sockets = {"loop": self._loop.socket, "telemetry": self._publisher.socket}
         endpoints = {channel: bind(socket, directory, names[channel]) for channel, socket in sockets.items()}
         welcome = client.join(endpoints)
+        for path in welcome["context"].get("brings", ()):
+            bring_file(Path(path))
         scene = Scene.from_dict(welcome["scene"])
         timebase = Timebase(**welcome["timebase"])
         self._plant = Plant(scene, timebase)

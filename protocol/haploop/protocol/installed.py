@@ -1,12 +1,20 @@
-"""The entry points of installed packages: elements, estimators, integrators, effects and forces that they offer."""
+"""What a scene may name beside what comes with haploop: of installed packages, by entry points, and of plugin files."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoints
+
+Cached = TypeVar("Cached", bound=Callable[..., Any])
+# Classes by group and name, and the text and name of each file that they came from.
+Brought = Mapping[str, Mapping[str, type]]
+_brought: dict[str, dict[str, type]] = {}
+_sources: dict[type, tuple[str, str]] = {}
+_caches: list[Callable[[], None]] = []
 
 
 def entry_points_of(group: str) -> EntryPoints:
@@ -20,3 +28,48 @@ def _all() -> Any:
     from importlib.metadata import entry_points
 
     return entry_points()
+
+
+def brought(group: str) -> Mapping[str, type]:
+    """Returns the classes that plugin files have brought into this process, by the name that a scene gives them."""
+    return _brought.get(group, {})
+
+
+def all_brought() -> Brought:
+    """Returns the classes of every group, for ``bring`` to make the same known again."""
+    return {group: dict(classes) for group, classes in _brought.items()}
+
+
+def sources_brought() -> tuple[tuple[str, str], ...]:
+    """Returns text and name of the files that brought what is known, for other processes."""
+    known = [made for classes in _brought.values() for made in classes.values()]
+    return tuple(dict.fromkeys(_sources[made] for made in known if made in _sources))
+
+
+def bring(classes: Brought, source: tuple[str, str] | None = None) -> None:
+    """Makes classes known to this process by group and name; one of a name that is known takes its place."""
+    for group, named in classes.items():
+        if any(_brought.get(group, {}).get(name) is not made for name, made in named.items()):
+            _brought.setdefault(group, {}).update(named)
+            forget()
+        if source:
+            _sources.update(dict.fromkeys(named.values(), source))
+
+
+def take_back(known: Brought) -> None:
+    """Makes known what ``all_brought`` returned, and nothing else."""
+    _brought.clear()
+    _brought.update({group: dict(classes) for group, classes in known.items()})
+    forget()
+
+
+def forget() -> None:
+    for clear in _caches:
+        clear()
+
+
+def cached_until_brought(function: Cached) -> Cached:
+    """Keeps what a function returns, as ``functools.cache``, until a file brings something it may depend on."""
+    kept: Any = cache(function)
+    _caches.append(kept.cache_clear)
+    return kept

@@ -91,7 +91,7 @@ def start(
     file.write_text(str(scene), encoding="utf-8")
     words = [sys.executable, "-m", "haploop.tools.cli", "run", str(file), "--out", str(directory), "--json"]
     words += ["--pace", repr(_STANDING) if paused else "free" if math.isinf(pace) else repr(float(pace))]
-    words += [word for plugin in dict.fromkeys(scene.plugin_files.values()) for word in ("--plugin", str(plugin))]
+    words += [word for plugin in scene.plugins for word in ("--plugin", str(plugin))]
     with Path(scratch.name, _TOLD).open("w", encoding="utf-8") as errors:
         # In a group of its own: Ctrl-C is for this program, which ends the run in order.
         process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=errors, process_group=0)

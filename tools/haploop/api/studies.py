@@ -43,7 +43,7 @@ def sweep(
         values: laid over the scene, as in ``load``.
         out: directory of the table; one that holds this very sweep goes on. When None, nothing is kept.
         workers: processes; one a core when None.
-        plugins: files with elements.
+        plugins: files with elements, walls, estimators or hand forces.
 
     Raises:
         SceneError, PluginError, NeedsPyarrow: the sweep cannot be run, or pyarrow is not installed.
@@ -57,7 +57,7 @@ def sweep(
         files = [Path(plugin) for plugin in plugins]
         if axes is not None:
             scene = of if isinstance(of, LoadedScene) else load(of, plugins=files)
-            files = files or list(dict.fromkeys(scene.plugin_files.values()))
+            files = files or list(scene.plugins)
             listed = {key: getattr(points, "tolist", lambda of=points: of)() for key, points in axes.items()}
             made = {"title": scene["title"], "base": scene.tables, "axes": plain(listed)}
             path = Path(scratch, "sweep.toml")

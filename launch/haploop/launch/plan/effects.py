@@ -5,18 +5,19 @@ An effect that is not named is not there: its modules are not imported and no in
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING
 
+from haploop.controller.estimators.base import Estimator
 from haploop.controller.estimators.choose import estimator_class, estimators_for
 from haploop.launch.plan import rules
 from haploop.launch.plan.effect import CHAIN, COUNTED, HISTORY, LINE, LINEAR_RATES, NOISY, RUBBING, Effect
 from haploop.launch.plan.meant.notes import note_unmeant
 from haploop.launch.plan.meant.rule import Note
 from haploop.plant.integrators.registry import find_integrator, integrator_module, integrator_names
-from haploop.protocol.installed import entry_points_of
+from haploop.protocol.installed import brought, cached_until_brought, entry_points_of
 from haploop.protocol.scene.effects import Accelerometer
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.paths import value_at, without
@@ -55,9 +56,10 @@ def _integrators() -> Iterator[Effect]:
             )
 
 
-def _estimators(of: str) -> Iterator[Effect]:
+def _estimators(of: str, names: Container[str] | None = None) -> Iterator[Effect]:
+    """Makes the effects of the estimators that a table may name, but for the backward difference."""
     for name, kind in estimators_for(of).items():
-        if name != "difference":
+        if name in names if names is not None else name != "difference":
             yield Effect(
                 f"{of}.estimator",
                 "controller",
@@ -159,13 +161,14 @@ EFFECTS: tuple[Effect, ...] = (
 )  # fmt: skip
 
 
-@cache
+@cached_until_brought
 def all_effects() -> tuple[Effect, ...]:
-    """Returns the effects of the table and, after them, those of other packages."""
-    return *EFFECTS, *(entry.load() for entry in entry_points_of(_GROUP))
+    """Returns the effects of the table and, after them, those of other packages and of plugin files."""
+    of_files = [effect for of in ("velocity", "acceleration") for effect in _estimators(of, brought(Estimator.group))]
+    return *EFFECTS, *of_files, *(entry.load() for entry in entry_points_of(_GROUP))
 
 
-@cache
+@cached_until_brought
 def alone_perhaps() -> tuple[Effect, ...]:
     """Returns the effects with which a scene cannot always be one of many that run as one."""
     return tuple(effect for effect in all_effects() if effect.batches is not True or effect.table)

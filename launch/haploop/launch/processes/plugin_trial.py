@@ -54,7 +54,12 @@ class PluginTrial:
     """One plugin in a process of its own, which ends with this object, a context manager.
 
     ``load`` and ``make`` are generators, so that a clock can go on meanwhile: they yield while the answer is not there.
+
+    Attributes:
+        brings: whether the file has walls, estimators or hand forces, too; known once it was loaded.
     """
+
+    brings = False
 
     def __init__(self, source: str, origin: str, limit_s: float = LIMIT_S) -> None:
         self._source, self._origin, self._limit_s = source, origin, limit_s
@@ -81,6 +86,7 @@ class PluginTrial:
         """
         when = "as it loaded"
         reply = yield from self._ask({"source": self._source, "origin": self._origin}, when, PluginError)
+        self.brings = reply.get("brings") is True
         try:
             return {kind: _stand_in(kind, declared) for kind, declared in reply["kinds"].items()}
         except (LookupError, TypeError, ValueError, AttributeError):

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import zmq
 
 from haploop.controller.dissipation.registry import installed
+from haploop.controller.tried import names_of_files
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.commands import Commands
 from haploop.launch.clock.device_time import PLANT, lateness_told
@@ -100,6 +101,7 @@ class Supervisor:
         told = {
             "out": str(spec.out.resolve()),
             "plugins": [str(path.resolve()) for path in spec.plugins],
+            "brings": [str(path.resolve()) for path in spec.plugins] if names_of_files(scene) else [],
             "elements": installed(),
             "attachments": spec.attachments,
             "clock": spec.clock,

@@ -21,6 +21,7 @@ from haploop.logger.summary import Summary
 from haploop.plant.plant import Plant
 from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.changes import Event, is_change, refusal
+from haploop.protocol.plugin_file import raised_in_file
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import BlockLength, Timebase
 
@@ -69,7 +70,11 @@ def run_in_process(
     except ElementError as error:
         loop.fail(f"The controller failed: {error}")
     except ArithmeticError as error:
-        loop.fail(f"The plant failed: {error}")
+        loop.fail(f"The plant failed: {raised_in_file(error) or error}")
+    except Exception as error:
+        if not (why := raised_in_file(error)):
+            raise
+        loop.fail(f"What a plugin file brings failed: {why}")
     return loop.judged(out)
 
 

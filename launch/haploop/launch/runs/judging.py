@@ -31,7 +31,7 @@ def judge_elsewhere(scene: Scene, plugins: Sequence[Path], events: list[tuple[in
         process_group=0,
     )
     try:
-        answer, _ = judging.communicate(pickle.dumps((scene, list(plugins), events)))
+        answer, _ = judging.communicate(pickle.dumps((scene.as_dict(), list(plugins), events)))
     finally:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(judging.pid, signal.SIGKILL)
@@ -55,7 +55,8 @@ def main() -> None:
         nowhere = os.open(os.devnull, os.O_RDWR)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 0)
-        pickle.dump(find(scene, registry(plugins), events), answers)
+        kinds = registry(plugins)
+        pickle.dump(find(Scene.from_dict(scene), kinds, events), answers)
 
 
 if __name__ == "__main__":

@@ -9,12 +9,14 @@ from typing import Any
 
 from haploop.controller.dissipation import Element, load_plugin, registry
 from haploop.controller.dissipation.registry import checked
+from haploop.controller.tried import try_kinds
 from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.layers import Layers, lay_overrides
 from haploop.launch.scene.toml_writer import inline, to_toml
 from haploop.launch.scene.unmodelled import demand_modelled
+from haploop.protocol.installed import Brought, all_brought, bring
 from haploop.protocol.names import meant
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Tables
@@ -35,15 +37,20 @@ class LoadedScene:
         path: the file it was read from.
         kinds: the elements at hand, by kind.
         plugin_files: the file of each kind that came from one.
+        plugins: the plugin files that it was loaded with.
+        brought: walls, estimators and hand forces of these; what is loaded later may take their names in this process.
     """
 
     scene: Scene
     path: Path
     kinds: Mapping[str, type[Element]] = field(default_factory=dict)
     plugin_files: Mapping[str, Path] = field(default_factory=dict)
+    plugins: tuple[Path, ...] = ()
+    brought: Brought = field(default_factory=all_brought)
 
     def __post_init__(self) -> None:
         try_out(elements_of(self.scene), self.kinds)
+        try_kinds(self.scene)
 
     @property
     def tables(self) -> Tables:
@@ -127,6 +134,7 @@ class LoadedScene:
         return self._resolved(layers)
 
     def _resolved(self, layers: Layers) -> LoadedScene:
+        bring(self.brought)
         return replace(self, scene=demand_modelled(layers, resolve(layers, self.kinds).in_order()))
 
 
@@ -139,21 +147,21 @@ def load(
         path: the scene file (TOML).
         values: laid over what it says, as in :meth:`LoadedScene.set`.
         elements: element classes that may be named by their kind, in this scene and in those made of it.
-        plugins: files that define elements.
+        plugins: files that define elements, walls, estimators or hand forces.
 
     Raises:
         SceneError: the scene cannot be run; it holds every mistake.
-        PluginError: a file or a class is no usable element.
+        PluginError: a file defines nothing usable, or a class is no usable element.
         ElementError: an element's own code does not take its parameters.
     """
     kinds, files = registry(), {}
-    for plugin in map(Path, plugins):
+    for plugin in (paths := tuple(map(Path, plugins))):
         found = load_plugin(plugin)
         kinds |= found
         files |= dict.fromkeys(found, plugin)
     kinds |= (given := {checked(element, element.__name__).kind: element for element in elements})
     files = {kind: file for kind, file in files.items() if kind not in given}
-    return LoadedScene(scene_file.load(path, texts(values), kinds), Path(path), kinds, files)
+    return LoadedScene(scene_file.load(path, texts(values), kinds), Path(path), kinds, files, paths)
 
 
 def texts(values: Values) -> list[str]:

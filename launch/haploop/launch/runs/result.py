@@ -21,6 +21,7 @@ from haploop.launch.spec import SCENE, make_output
 from haploop.logger.log.recording import MemoryLog, Recording, Table
 from haploop.logger.session import LOG
 from haploop.logger.summary import Summary
+from haploop.protocol.installed import bring
 from haploop.protocol.names import meant
 
 if TYPE_CHECKING:
@@ -135,6 +136,7 @@ def run(
     scene = scene if isinstance(scene, LoadedScene) else load(scene)
     if math.isfinite(pace) and not processes:
         raise ValueError(f"A pace of {pace:g} needs the clock of a run as processes; give processes=True too.")
+    bring(scene.brought)
     if out is None and not processes:
         memory = MemoryLog()
         summary = run_in_process(scene.scene, dict(scene.kinds), attachments={SCENE: str(scene)}, memory=memory)
@@ -144,8 +146,7 @@ def run(
     # Without a directory, one that is removed once it has been read.
     with tempfile.TemporaryDirectory(prefix="haploop-") if out is None else nullcontext(out) as directory:
         target = make_output(Path(directory), scene.path)
-        files = dict.fromkeys(scene.plugin_files.values())
-        prepared = start.lay_out(scene.scene, dict(scene.kinds), target, list(files), dict(scene.plugin_files))
+        prepared = start.lay_out(scene.scene, dict(scene.kinds), target, scene.plugins, dict(scene.plugin_files))
         summary = start.run(prepared, in_process=not processes, pace=pace)
         has_log = (target / LOG).exists()  # a scene may ask for none
         kept = None if out is not None else haploop.logger.read(target) if has_log else Recording({}, "", {})

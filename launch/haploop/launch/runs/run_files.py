@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import haploop.logger
 from haploop.controller.dissipation import Element, registry
-from haploop.controller.dissipation.element import hint_of
+from haploop.launch.runs.stand_ins import elements_for, standing_in
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import Mistake, SceneError
@@ -19,9 +19,7 @@ from haploop.logger.log import LogError
 from haploop.logger.log.recording import Recording, Table
 from haploop.logger.summary import SUMMARY, Summary, misfit, read
 from haploop.protocol.changes import changes_of
-from haploop.protocol.quantity import Quantity
-from haploop.protocol.scene.scene import NO_ELEMENT, Scene
-from haploop.protocol.scene.table import Tables
+from haploop.protocol.scene.scene import Scene
 
 
 def recorded_scene(
@@ -32,7 +30,7 @@ def recorded_scene(
     Args:
         directory: of the run.
         attachments: of its log.
-        kinds: the elements at hand; when None, elements that are not installed may stand in the scene, too.
+        kinds: the elements at hand; when None, what is not installed may stand in the scene, too.
 
     Returns:
         None where there is neither.
@@ -50,46 +48,10 @@ def recorded_scene(
         tables = parse(path)
     else:
         return None
-    return resolve(Layers(path, tables), registry() | _stand_ins(tables) if kinds is None else kinds).in_order()
-
-
-def _stand_ins(tables: Tables) -> dict[str, type[Element]]:
-    """Makes an element for each kind that a scene names, with the values that it gives, whatever they mean."""
-    given: dict[str, dict[str, list[Any]]] = {}
-    for table in _elements(tables):
-        values = given.setdefault(table["kind"], {})
-        for name in table:
-            if name.isidentifier() and name not in ("kind", "acts"):
-                values.setdefault(name, []).append(table[name])
-    events = tables.get("event")
-    sets = [event.get("set") for event in events if isinstance(event, dict)] if isinstance(events, list) else []
-    later = [value for each in sets if isinstance(each, dict) for value in each.values()]
-    made = {}
-    for kind, values in given.items():
-        hints = {name: hint_of(Quantity("", choices=_choices(of, later))) for name, of in values.items()}
-        body = {"kind": kind, "force": lambda self, motion: 0.0, "__annotations__": hints}
-        made[kind] = type("StandIn", (Element,), body)
-    return made
-
-
-def _choices(values: list[Any], later: list[Any]) -> tuple[str | bool, ...]:
-    """Returns what a parameter with these values may be: no choices of a number, all texts there are of a text."""
-    if any(isinstance(value, bool) for value in values):
-        return False, True
-    if not any(isinstance(value, str) for value in values):
-        return ()
-    return tuple(dict.fromkeys(value for value in (*values, *later) if isinstance(value, str)))
-
-
-def _elements(tables: Tables) -> Iterator[Tables]:
-    installed = registry()
-    lists = [tables.get(key) for key in ("dissipation", "event")]
-    entries = [entry for one in lists if isinstance(one, list) for entry in one if isinstance(entry, dict)]
-    for entry in entries:
-        table = entry.get("swap", entry)
-        kind = table.get("kind") if isinstance(table, dict) else None
-        if isinstance(kind, str) and kind not in (*installed, NO_ELEMENT):
-            yield table
+    if kinds is not None:
+        return resolve(Layers(path, tables), kinds).in_order()
+    with standing_in(tables):
+        return resolve(Layers(path, tables), registry() | elements_for(tables)).in_order()
 
 
 def holds_readings(scene: Scene) -> bool:

@@ -13,6 +13,7 @@ from haploop.controller.dissipation import Element, load_plugin, registry
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.file import load
 from haploop.launch.spec import RunFailed, RunSpec, discard, keep_plugin, make_output, write_scene
+from haploop.protocol.plugin_file import bring_file
 from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -36,7 +37,8 @@ def prepare(
     """Reads and checks everything; only when all is well is anything written.
 
     With ``any_hand`` the scene's may be unmodelled, which only a plant of somebody else's moves.
-    Plugins are tried in processes of their own; ``kinds`` of what is returned are stand-ins of their elements.
+    Plugins are tried in processes of their own; ``kinds`` of what is returned are stand-ins of their elements, and only
+    a file that brings more than elements is run in this process, too.
 
     Raises:
         SceneError: the scene has mistakes.
@@ -66,6 +68,8 @@ def _with_plugins(
         for plugin, trial in trials.items():
             for kind, element in trial.wait(trial.load()).items():
                 kinds[kind], sources[kind] = element, plugin
+            if trial.brings:  # of these the checks ask the class itself
+                bring_file(plugin)
         scene = load(scene_path, overrides, kinds, any_hand=any_hand)
         elements = elements_of(scene)
         try_out([element for element in elements if element.name not in sources], kinds)

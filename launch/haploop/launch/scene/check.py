@@ -33,7 +33,14 @@ if TYPE_CHECKING:
 # Where the key ``kind`` says what else is in a table; a number stands for any.
 _TAGGED = {("hand", "force"), ("jitter",), ("dissipation", 0), ("event", 0, "swap")}
 _SOME_S = 1.0
-_OWN_KIND = " An element of yours comes with --plugin FILE."
+_OWN_KIND = " {} of yours comes with --plugin FILE."
+# What a file of one's own may bring, by the last keys of where it is named.
+_OWN: dict[KeyPath, str] = {
+    ("wall", "kind"): "A wall",
+    ("velocity", "estimator"): "An estimator",
+    ("acceleration", "estimator"): "An estimator",
+    ("force", "kind"): "A hand force",
+}
 _A_SWAP = 'It must be a table, such as { kind = "damping", damping = 0.8 }.'
 _FORMS = {
     "bool_type": "It must be true or false.",
@@ -186,7 +193,8 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
         case "union_tag_invalid" | "literal_error":
             key = (*key, "kind") if what == "union_tag_invalid" else key
             allowed = alternatives(schema, rule)
-            own = _OWN_KIND if "dissipation" in key or "swap" in key else ""
+            whose = "An element" if "dissipation" in key or "swap" in key else _OWN.get(tuple(key[-2:]), "")
+            own = _OWN_KIND.format(whose) if whose else ""
             layers.complain(key, f"Allowed: {', '.join(allowed)}.{own}", None, nearest(layers.value(key), allowed))
             if what == "union_tag_invalid":
                 _complain_of_keys(layers, key[:-1], schema, rule)

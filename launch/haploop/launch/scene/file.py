@@ -13,6 +13,7 @@ from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError, shown
 from haploop.launch.scene.reading.lines import KeyPath, line_in
 from haploop.launch.scene.reading.shorthand import put_in_full
 from haploop.launch.scene.unmodelled import demand_modelled
+from haploop.protocol.installed import all_brought
 from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -47,7 +48,12 @@ def resolved(
     *,
     any_hand: bool = False,
 ) -> Scene:
-    """Returns the resolved scene of layers that were read already; a SceneError holds every mistake."""
+    """Returns the resolved scene of layers that were read already.
+
+    Raises:
+        SceneError: the scene cannot be run; it holds every mistake.
+        PluginError: what it names of a plugin file gives no number.
+    """
     lay_overrides(layers, overrides)
     layers.data.setdefault("title", layers.path.stem)
     put_in_full(layers)
@@ -56,6 +62,10 @@ def resolved(
 
         kinds = registry()
     scene = resolve(layers, kinds).in_order()
+    if all_brought():
+        from haploop.controller.tried import try_kinds
+
+        try_kinds(scene)
     return scene if any_hand else demand_modelled(layers, scene)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache, reduce
+from functools import reduce
 from operator import or_
 from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -16,6 +16,7 @@ from haploop.controller.estimators.choose import estimators_for
 from haploop.launch.plan.effects import all_effects
 from haploop.launch.scene.number import Number
 from haploop.plant.integrators.registry import integrator_names
+from haploop.protocol.installed import cached_until_brought
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import Trace
@@ -54,7 +55,7 @@ class FunctionOfTime(Model):
 _BASES: dict[type[Table], type[Model]] = {Trace: FunctionOfTime}
 
 
-@cache
+@cached_until_brought
 def model_of(table: type[Table]) -> type[Model]:
     """Makes the model that validates a table: bounds and units at every number, no unknown keys."""
     return _model(table.__name__, table.__doc__, _keys_of(table, _registered(table)), _BASES.get(table, Model))
@@ -100,7 +101,7 @@ def _default(field: dataclasses.Field[Any]) -> Any:
 def _validated(hint: Any) -> Any:
     """Returns the type of a key with numbers that read units, and models in place of tables."""
     if isinstance(hint, type) and issubclass(hint, Table):
-        return model_of(hint)
+        return _one_of([model_of(table) for table in hint.alternatives()])
     origin, parts = get_origin(hint), get_args(hint)
     if origin is Annotated:
         marks = [Number(mark) if isinstance(mark, Quantity) else mark for mark in parts[1:]]
@@ -115,7 +116,7 @@ def _validated(hint: Any) -> Any:
     return hint
 
 
-@cache
+@cached_until_brought
 def number_of(table: type[Table], key: str) -> Number:
     declared = get_type_hints(table, include_extras=True).get(key)
     marks = get_args(_validated(declared)) if declared else model_of(table).model_fields[key].metadata
@@ -146,7 +147,7 @@ def scene_model(kinds: Mapping[str, type[Element]], named: Mapping[str, Any] | N
     return _scene_model(tuple(kinds.items()), frozenset(named), is_plain)
 
 
-@cache
+@cached_until_brought
 def _scene_model(
     kinds: tuple[tuple[str, type[Element]], ...], named: frozenset[str] | None, has_spring: bool = False
 ) -> type[Model]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import deepcopy
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
@@ -12,6 +11,7 @@ from pydantic_core import core_schema
 
 from haploop.launch.scene.models import model_of, scene_model
 from haploop.launch.scene.reading.shorthand import CountedRange
+from haploop.protocol.installed import cached_until_brought
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -56,7 +56,7 @@ def whole_schema(kinds: Mapping[str, type[Element]]) -> Schema:
     return _whole_schema(tuple(kinds.items()))
 
 
-@lru_cache(maxsize=4)
+@cached_until_brought
 def _whole_schema(kinds: tuple[tuple[str, type[Element]], ...]) -> Schema:
     schema = scene_model(dict(kinds)).model_json_schema(schema_generator=TomlSchema)
     about = "a CSV of time and force, in s and N or in the units of its header's brackets, in place of time and force"

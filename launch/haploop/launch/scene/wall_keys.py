@@ -10,7 +10,7 @@ from haploop.launch.scene.events import elements_of
 from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.models import number_of
 from haploop.protocol.scene.scene import Scene, Wall
-from haploop.protocol.walls.registry import all_walls, class_of, own_parameters
+from haploop.protocol.walls.registry import all_walls, class_of
 from haploop.protocol.walls.wall import Spring
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def check_wall(layers: Layers) -> None:
     walls, name = all_walls(), table.get("kind", "spring")
     if not isinstance(name, str) or name not in walls:
         return
-    for key, default in own_parameters(walls[name]).items():
+    for key, (_, default) in walls[name].parameters().items():
         if default is MISSING and key not in table:
             expected = f"A wall of the kind {name} needs {number_of(Wall, key).form}."
             layers.complain(("wall", key), expected, "is missing")
@@ -37,7 +37,7 @@ def check_wall(layers: Layers) -> None:
 
 def with_defaults(scene: Scene) -> Scene:
     """Returns a scene whose wall has all parameters of its kind."""
-    own = own_parameters(class_of(scene.wall))
+    own = {key: default for key, (_, default) in class_of(scene.wall).parameters().items()}
     if scene.wall is None or not own:
         return scene
     return replace(scene, wall=replace(scene.wall, others=own | scene.wall.others))

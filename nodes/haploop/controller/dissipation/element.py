@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, dataclass_transform, get_args, get_origin, get_type_hints
 
+from haploop.protocol import plugin_file
 from haploop.protocol.quantity import Quantity
 
 
@@ -18,20 +18,16 @@ class ElementError(Exception):
 
 
 _HERE = Path(__file__).parent
-_NO_PLUGIN = (_HERE.parent, _HERE / "registry.py")
-# A run keeps a copy of each plugin under its name with a digest: people are told the name that they gave.
-_KEPT = re.compile(r"-[0-9a-f]{12}(?=\.py$)")
+_NO_PLUGIN = (_HERE.parent, _HERE / "registry.py", Path(plugin_file.__file__))
 
 
 def places_of(error: BaseException | None) -> list[tuple[str, int]]:
     """Returns the files and lines of elements through which an error came, the innermost last; none of this package."""
-    places, trace = [], error.__traceback__ if error else None
-    while trace:
-        file = trace.tb_frame.f_code.co_filename
-        if not (file.startswith("<") or {Path(file), Path(file).parent} & {*_NO_PLUGIN}):
-            places.append((file, trace.tb_lineno))
-        trace = trace.tb_next
-    return places
+    return [
+        (file, line)
+        for file, line in plugin_file.places_of(error)
+        if not (file.startswith("<") or {Path(file), Path(file).parent} & {*_NO_PLUGIN})
+    ]
 
 
 def place_in(kind: type[Element] | None, error: BaseException | None = None) -> str:
@@ -39,7 +35,7 @@ def place_in(kind: type[Element] | None, error: BaseException | None = None) -> 
     code = getattr(getattr(kind, "force", None), "__code__", None)
     places = places_of(error) or ([(code.co_filename, code.co_firstlineno)] if code else [])
     lines = [line for file, line in places if file == places[0][0]]
-    return f" ({_KEPT.sub('', Path(places[0][0]).name)}, line {lines[-1]})" if lines else ""
+    return f" ({plugin_file.told_name(places[0][0])}, line {lines[-1]})" if lines else ""
 
 
 def raised(error: BaseException | None, kind: type[Element] | None = None) -> str:
@@ -170,6 +166,8 @@ class Element(ABC):
             memory, a NamedTuple, as they are after each tick.
     """
 
+    group: ClassVar[str] = plugin_file.ELEMENTS
+    named_by: ClassVar[str] = "kind"
     kind: ClassVar[str]
     memory: ClassVar[Any] = None
     linear: ClassVar[bool] = False

@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 import inspect
-import sys
 from collections.abc import Mapping
-from contextlib import redirect_stdout
 from dataclasses import MISSING
 from pathlib import Path
 from pkgutil import resolve_name
-from types import ModuleType
-from typing import Any
 
-from haploop.controller.dissipation.element import ASKABLE, Element, places_of
-from haploop.protocol.files import read_text
-from haploop.protocol.installed import entry_points_of
+from haploop.controller.dissipation.element import ASKABLE, Element
+from haploop.protocol.installed import Brought, entry_points_of
+from haploop.protocol.plugin_file import ELEMENTS, PluginError, bring_file, bring_source
 from haploop.protocol.quantity import Quantity
-
-ENTRY_POINT_GROUP = "haploop.dissipation"
-
-
-class PluginError(Exception):
-    """A plugin that cannot be used; the message says why."""
 
 
 def installed() -> dict[str, str]:
     """Returns "module:class" of every installed kind by name."""
-    found = sorted(entry_points_of(ENTRY_POINT_GROUP), key=lambda point: point.name)
+    found = sorted(entry_points_of(ELEMENTS), key=lambda point: point.name)
     return {point.name: f"{point.module}:{point.attr}" for point in found}
 
 
@@ -53,52 +43,22 @@ def registry(
 
 
 def load_plugin(path: Path) -> dict[str, type[Element]]:
-    """Returns the elements a Python file defines, by kind. The file is executed: only a file the user named comes here.
+    """Returns the elements a Python file defines, by kind, and makes known what else it brings, as ``bring_file`` does.
 
     Raises:
-        PluginError: the file cannot be read or run, or defines no usable element.
+        PluginError: the file cannot be read or run, or defines nothing usable.
     """
-    try:
-        source = read_text(path)
-    except OSError as error:
-        raise PluginError(f"The plugin {path} does not load: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise PluginError(f"The plugin {path} does not load: byte {error.start} is not UTF-8 text.") from error
-    return load_source(source, str(path))
+    return _elements_of(bring_file(path), str(path))
 
 
 def load_source(source: str, origin: str) -> dict[str, type[Element]]:
-    """Returns the elements that the text of a Python file defines, by kind; ``origin`` is the file.
+    """Does with the text of a file what ``load_plugin`` does with the file, ``origin``."""
+    return _elements_of(bring_source(source, origin), origin)
 
-    Its ``print`` writes to stderr, now and later, since stdout belongs to the answers of commands.
 
-    Raises:
-        PluginError: the text cannot be run, or defines no usable element.
-    """
-    import hashlib
-
-    try:
-        module = ModuleType("haploop_plugin_" + hashlib.sha256(source.encode()).hexdigest()[:12])
-        module.__file__ = origin
-        module.__dict__["print"] = _print
-        sys.modules[module.__name__] = module  # dataclasses and type hints look the names up there
-        with redirect_stdout(sys.stderr):
-            exec(compile(source, origin, "exec"), module.__dict__)
-    except (Exception, SystemExit) as error:
-        lines = [line for file, line in places_of(error) if file == origin]
-        if isinstance(error, SyntaxError) and error.filename == origin and error.lineno:
-            lines = [error.lineno]
-        line = f", line {lines[-1]}" if lines else ""
-        raise PluginError(f"The plugin {origin}{line} does not load: {type(error).__name__}: {error}") from error
-    found = [c for c in vars(module).values() if inspect.isclass(c) and c.__module__ == module.__name__]
-    elements = [checked(c, origin) for c in found if issubclass(c, Element)]
-    if not elements:
-        raise PluginError(f"The plugin {origin} defines no element; a class derived from Element was expected.")
+def _elements_of(found: Brought, origin: str) -> dict[str, type[Element]]:
+    elements = [checked(element, origin) for element in found.get(ELEMENTS, {}).values()]
     return {element.kind: element for element in elements}
-
-
-def _print(*values: object, file: Any = None, **how: Any) -> None:
-    print(*values, file=sys.stderr if file is None else file, **how)
 
 
 def checked(element: object, origin: str) -> type[Element]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass
 from typing import Any, ClassVar
 
 from haploop.protocol.quantity import Quantity
@@ -31,6 +31,8 @@ class Estimator(ABC):
         linear: whether the estimate is a linear function of the samples.
     """
 
+    group: ClassVar[str] = "haploop.estimators"
+    named_by: ClassVar[str] = "name"
     name: ClassVar[str]
     does: ClassVar[str]
     tables: ClassVar[tuple[str, ...]] = ("velocity", "acceleration")
@@ -39,6 +41,20 @@ class Estimator(ABC):
     keys: ClassVar[Mapping[str, Quantity]] = {}
     needs_without: ClassVar[Mapping[str, tuple[str, ...]]] = {}
     linear: ClassVar[bool] = True
+
+    @classmethod
+    def parameters(cls) -> dict[str, tuple[Quantity, Any]]:
+        """Returns the keys of its own by name: the declaration, and that there is no default."""
+        return {name: (quantity, MISSING) for name, quantity in cls.keys.items()}
+
+    @classmethod
+    def complaint(cls) -> str:
+        """Returns what is wrong with a class that is to be an estimator; "" where nothing is."""
+        if not isinstance(getattr(cls, "does", None), str):
+            return 'does not say what its estimate is; write does = "that of a filter of mine" in the class.'
+        if unknown := [key for key in cls.keys if key not in (*cls.needs, *cls.takes)]:
+            return f"has the key {unknown[0]}; name it in needs, or in takes where it may be left out."
+        return ""
 
     @classmethod
     @abstractmethod

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-from functools import cache
-from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from haploop.controller.estimators.base import Difference, Estimator, LowPass, Unchanged
 from haploop.protocol.arrays import each
-from haploop.protocol.installed import entry_points_of
+from haploop.protocol.installed import cached_until_brought
+from haploop.protocol.register import Register
 from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
 
 # Every estimator by the name that a scene gives it: the class, or "module:class", which is imported where it is used.
 ESTIMATORS: dict[str, str | type[Estimator]] = {
@@ -23,33 +19,14 @@ ESTIMATORS: dict[str, str | type[Estimator]] = {
     "foaw": "haploop.controller.estimators.windows:EndFit",
     "kalman": "haploop.controller.estimators.kalman:Kalman",
 }
-# Other packages name theirs in this group of entry points.
-_GROUP = "haploop.estimators"
+_REGISTER: Register[Estimator] = Register("estimator", Estimator.group, ESTIMATORS)
+estimator_class = _REGISTER.find
 
 
-def _from_outside() -> dict[str, EntryPoint]:
-    """Returns the estimators of other packages by name; whoever uses none of them needs no search."""
-    return {entry.name: entry for entry in entry_points_of(_GROUP)}
-
-
-def estimator_names() -> tuple[str, ...]:
-    """Returns the names of all estimators, those of other packages last."""
-    return tuple({**ESTIMATORS, **_from_outside()})
-
-
-def estimator_class(name: str) -> type[Estimator]:
-    """Returns the estimator of a name, KeyError for none; its module is imported here."""
-    if name not in ESTIMATORS:
-        return _from_outside()[name].load()
-    found = ESTIMATORS[name]
-    return resolve_name(found) if isinstance(found, str) else found
-
-
-@cache
+@cached_until_brought
 def estimators_for(table: str) -> dict[str, type[Estimator]]:
     """Returns the estimators that a table of the scene ("velocity", "acceleration") may name; all are imported."""
-    classes = {name: estimator_class(name) for name in estimator_names()}
-    return {name: kind for name, kind in classes.items() if table in kind.tables}
+    return {name: kind for name, kind in _REGISTER.all().items() if table in kind.tables}
 
 
 def make_estimators(scene: Scene, period_s: float) -> tuple[Estimator, Estimator, str]:

@@ -84,23 +84,4 @@ def constant_forces(scene: Scene) -> dict[str, float]:
 
 
 def _profile(force: tables.HandForce | None) -> Profile:
-    match force:
-        case None:
-            return np.zeros_like
-        case tables.Constant(value=value):
-            return lambda t: np.zeros_like(t) + value
-        case tables.Ramp(value=value, rise_time=rise_time):
-            return lambda t: value * np.minimum(t / rise_time, 1.0)
-        case tables.Step(value=value, at=at):
-            return lambda t: np.where(t >= at, value, 0.0)
-        case tables.Sine(amplitude=amplitude, frequency=frequency, offset=offset, phase=phase):
-            return lambda t: offset + amplitude * np.sin(2 * np.pi * frequency * t + phase)
-        case tables.MinimumJerk(value=value, rise_time=rise_time):
-            return lambda t: value * _minimum_jerk(np.minimum(t / rise_time, 1.0))
-        case tables.Trace(time=time, force=forces):
-            times, values = np.asarray(time, float), np.asarray(forces, float)
-            return lambda t: np.interp(t, times, values)
-
-
-def _minimum_jerk(s: np.ndarray) -> np.ndarray:
-    return s * s * s * (10.0 + s * (6.0 * s - 15.0))
+    return np.zeros_like if force is None else force.force_at

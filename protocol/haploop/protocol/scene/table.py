@@ -71,6 +71,16 @@ class Table:
         return f"{type(self).__qualname__}({', '.join(f'{name}={value!r}' for name, value in vars(self).items())})"
 
     @classmethod
+    def of_kind(cls, kind: str) -> type[Table] | None:
+        """Returns the class of a table of a kind where this one is declared; None for none."""
+        return cls if cls.kind == kind else None
+
+    @classmethod
+    def alternatives(cls) -> list[type[Any]]:
+        """Returns every class of table that may stand where this one is declared."""
+        return [cls]
+
+    @classmethod
     def fields(cls) -> tuple[dataclasses.Field[Any], ...]:
         """Returns the declared keys, in order."""
         return dataclasses.fields(cls)
@@ -146,7 +156,7 @@ def _read(cls: type[Table], key: str, value: Any) -> Any:
     if not isinstance(value, dict) or not (tables := _tables_at(cls, key)):
         return value
     kind = value.get("kind", "")
-    return next((table for table in tables if table.kind == kind), tables[0]).from_dict(value)
+    return next((found for table in tables if (found := table.of_kind(kind))), tables[0]).from_dict(value)
 
 
 def as_plain(value: Any) -> Any:

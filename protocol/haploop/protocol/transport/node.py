@@ -15,6 +15,7 @@ from typing import TextIO
 
 import zmq
 
+from haploop.protocol.plugin_file import PluginError, raised_in_file
 from haploop.protocol.transport.clock_client import Aborted, ClockClient, Refused
 from haploop.protocol.transport.loop import LoopError
 from haploop.protocol.transport.prints import keep_prints
@@ -112,15 +113,16 @@ def take_part(
     except Aborted as error:
         tell(str(error))
         status = 1
-    except (Refused, NodeError, LoopError, BindError) as error:
+    except (Refused, NodeError, LoopError, BindError, PluginError) as error:
         client.leave("FAILED", -1, str(error))
         tell(str(error))
         status = 1
     except Exception as error:
-        import traceback
+        if not (why := raised_in_file(error)):
+            import traceback
 
-        traceback.print_exc()
-        client.leave("FAILED", -1, f"{type(error).__name__}: {error}")
+            traceback.print_exc()
+        client.leave("FAILED", -1, why or f"{type(error).__name__}: {error}")
         status = 1
     context.destroy(linger=int(1000 * transport_of(context).linger_s))
     return status

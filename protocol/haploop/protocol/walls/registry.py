@@ -2,17 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, fields
-from functools import cache
-from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any
-
-from haploop.protocol.installed import entry_points_of
+from haploop.protocol.register import Register
 from haploop.protocol.scene.scene import Wall as WallTable
 from haploop.protocol.walls.wall import Spring, Wall
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
 
 # Every wall by the name that a scene gives it: the class, or "module:class", which is imported where it is used.
 WALLS: dict[str, str | type[Wall]] = {
@@ -21,31 +13,8 @@ WALLS: dict[str, str | type[Wall]] = {
     "hunt-crossley": "haploop.protocol.walls.hunt_crossley:HuntCrossley",
     "texture": "haploop.protocol.walls.texture:Texture",
 }
-# Other packages name theirs in this group of entry points.
-_GROUP = "haploop.walls"
-
-
-def _from_outside() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points_of(_GROUP)}
-
-
-def wall_names() -> tuple[str, ...]:
-    """Returns the names of all walls, those of other packages last."""
-    return tuple({**WALLS, **_from_outside()})
-
-
-def wall_class(name: str) -> type[Wall]:
-    """Returns the wall of a name, KeyError for none; its module is imported here."""
-    if name not in WALLS:
-        return _from_outside()[name].load()
-    found = WALLS[name]
-    return resolve_name(found) if isinstance(found, str) else found
-
-
-@cache
-def all_walls() -> dict[str, type[Wall]]:
-    """Returns every wall by its name; all are imported."""
-    return {name: wall_class(name) for name in wall_names()}
+_REGISTER: Register[Wall] = Register("wall of the kind", Wall.group, WALLS)
+wall_class, all_walls = _REGISTER.find, _REGISTER.all
 
 
 def class_of(table: WallTable | None) -> type[Wall]:
@@ -63,9 +32,3 @@ def make_wall(table: WallTable | None) -> Wall:
 def parameters_of(kind: type[Wall]) -> tuple[str, ...]:
     """Returns the names of all numbers of a wall but its direction."""
     return "position", "stiffness", *kind.keys
-
-
-def own_parameters(kind: type[Wall]) -> dict[str, Any]:
-    """Returns the parameters that a wall has beside position and stiffness, with their defaults or ``MISSING``."""
-    defaults = {field.name: field.default for field in fields(kind)}
-    return {name: defaults.get(name, MISSING) for name in kind.keys}

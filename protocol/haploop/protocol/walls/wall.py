@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from typing import Any, ClassVar
 
 from haploop.protocol.arrays import where
@@ -26,12 +26,31 @@ class Wall(ABC):
         inward: direction that leads into it, +1.0 or -1.0; 0.0 where there is no wall, so that nothing is inside.
     """
 
+    group: ClassVar[str] = "haploop.walls"
+    named_by: ClassVar[str] = "kind"
     kind: ClassVar[str]
     keys: ClassVar[Mapping[str, Quantity]] = {}
     dissipates: ClassVar[bool] = False
     position: Any
     stiffness: Any
     inward: float
+
+    @classmethod
+    def parameters(cls) -> dict[str, tuple[Quantity, Any]]:
+        """Returns what it has beside position and stiffness, by name: the declaration, and the default or MISSING."""
+        defaults = {field.name: field.default for field in fields(cls)}
+        return {name: (quantity, defaults.get(name, MISSING)) for name, quantity in cls.keys.items()}
+
+    @classmethod
+    def complaint(cls) -> str:
+        """Returns what is wrong with a class that is to be a wall; "" where nothing is."""
+        known = {field.name for field in fields(cls)}
+        if lacks := [key for key in cls.keys if key not in known]:
+            return (
+                f"has the key {lacks[0]}, but no field of that name; write {lacks[0]}: Any in the class, and "
+                "@dataclass(frozen=True, slots=True) above it."
+            )
+        return ""
 
     @abstractmethod
     def push(self, depth: Any, speed: Any) -> Any:

@@ -75,7 +75,10 @@ Estimator = Annotated[
 ]
 Directory = Annotated[Path, typer.Argument(help="directory of a run", show_default=False)]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a key of the scene")]
-Plugin = Annotated[list[Path] | None, typer.Option("--plugin", metavar="FILE", help="Python file with elements")]
+Plugin = Annotated[
+    list[Path] | None,
+    typer.Option("--plugin", metavar="FILE", help="Python file with elements, walls, estimators or hand forces"),
+]
 Run = Annotated[str | None, typer.Option("--run", metavar="ID", help="which run, when several are live")]
 Json = Annotated[bool, typer.Option("--json", help="one JSON object on stdout")]
 

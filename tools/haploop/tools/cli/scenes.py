@@ -7,7 +7,7 @@ import sys
 from contextlib import redirect_stdout
 from json import dumps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -85,9 +85,13 @@ def check(
 
 
 def plugins(plugin: Plugin = None, json: Json = False) -> None:
-    """List the dissipation elements with their parameters."""
+    """List the dissipation elements with their parameters, and what else a file brings."""
+    from haploop.protocol.installed import all_brought
+
     with plain_errors():
-        kinds = kinds_with(plugin or [])
+        kinds: dict[str, Any] = dict(kinds_with(plugin or []))
+    for named in all_brought().values():
+        kinds |= named
     if json:
         print_json({kind: _parameters(element) for kind, element in kinds.items()})
         return

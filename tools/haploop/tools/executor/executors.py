@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import os
+import pickle
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent import futures
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from functools import partial
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, Self, TypeVar
 
 from haploop.launch.processes.one_thread import ask_for_one_thread
+from haploop.protocol.installed import sources_brought
+from haploop.protocol.plugin_file import bring_source
+from haploop.protocol.transport.prints import unheard
 from haploop.tools.machine import cores
 
 Item = TypeVar("Item")
@@ -134,8 +139,9 @@ class ProcessExecutor(Executor):
     def _start(self) -> None:
         """Starts workers and sees that they do start: of one that cannot, every scene would seem to be at fault."""
         context = get_context("spawn")
-        self._pipe = context.Pipe(duplex=False)
-        self._executor = ProcessPoolExecutor(self.count, context, initializer=_begin, initargs=self._pipe[:1])
+        held, _ = self._pipe = context.Pipe(duplex=False)
+        begin = partial(_begin, held, sources_brought())
+        self._executor = ProcessPoolExecutor(self.count, context, initializer=begin)
         try:
             self._executor.submit(os.getpid).result()
         except BrokenExecutor as error:
@@ -168,15 +174,19 @@ class DaskExecutor(Executor):
             raise ExecutorError(f"The Dask scheduler at {address} has no workers yet; start some with: dask worker")
 
     def submit(self, call: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        return self._executor.submit(call, *arguments)
+        return self._executor.submit(_called, sources_brought(), pickle.dumps((call, arguments)))
 
     def close(self, at_once: bool) -> None:
         self._executor.shutdown(wait=not at_once)
         self._client.close()
 
 
-def _begin(held: Connection) -> None:
-    """Makes this process a worker: Ctrl-C is for the one that started it, and without that one it ends."""
+def _begin(held: Connection, sources: tuple[tuple[str, str], ...]) -> None:
+    """Makes this process a worker: Ctrl-C is for the one that started it, and without that one it ends.
+
+    ``sources`` are the plugin files that brought what scenes may name.
+    """
+    _bring(sources)
 
     def end_with() -> None:
         with contextlib.suppress(EOFError, OSError):
@@ -185,6 +195,19 @@ def _begin(held: Connection) -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=end_with, daemon=True).start()
+
+
+def _bring(sources: tuple[tuple[str, str], ...]) -> None:
+    with unheard() if sources else contextlib.nullcontext():
+        for source, origin in sources:
+            bring_source(source, origin)
+
+
+def _called(sources: tuple[tuple[str, str], ...], packed: bytes) -> Any:
+    """Calls what was packed once its kinds are known here."""
+    _bring(sources)
+    call, arguments = pickle.loads(packed)
+    return call(*arguments)
 
 
 @contextlib.contextmanager

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from haploop.protocol.register import UnknownKind
 from haploop.protocol.walls.registry import make_wall
 from haploop.tools.figure import style
 from haploop.tools.figure.data import ElementSpan, Floats, RunData
@@ -66,11 +68,12 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
     in_contact = np.concatenate([d[(f != 0.0) | (d > 0.0)] for d, f in ((early_depth, early_force), (depth, force))])
     in_contact = in_contact[np.isfinite(in_contact)]
     deepest = in_contact.max(initial=0.0)
-    wall = make_wall(run.wall_table_at(span_s[1]))
-    label, points = ("ideal spring", 2) if wall.kind == "spring" else ("ideal wall, at rest", _CURVE)
-    line = np.linspace(0.0, deepest, points)
-    ideal = {"color": style.INK, "linewidth": 1.0, "dashes": (4, 2), "label": label, "gid": "spring"}
-    ax.plot(line * MM, wall.held(line), **ideal)
+    with suppress(UnknownKind):  # of a package or file that is not here
+        wall = make_wall(run.wall_table_at(span_s[1]))
+        label, points = ("ideal spring", 2) if wall.kind == "spring" else ("ideal wall, at rest", _CURVE)
+        line = np.linspace(0.0, deepest, points)
+        ideal = {"color": style.INK, "linewidth": 1.0, "dashes": (4, 2), "label": label, "gid": "spring"}
+        ax.plot(line * MM, wall.held(line), **ideal)
     low, high = in_contact.min(initial=0.0) * MM, deepest * MM
     margin = 0.06 * (high - low) or 0.01
     ax.set_xlim(low - margin, high + margin)

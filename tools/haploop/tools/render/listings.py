@@ -73,6 +73,7 @@ def plugins_table(kinds: Mapping[str, type[Element]]) -> Table:
     table = make_table("kind", "what it does", "parameters", unbroken=("kind",))
     for kind, element in kinds.items():
         about = (element.__doc__ or "").strip().partition("\n")[0]
+        about = "" if about.startswith(f"{element.__name__}(") else about  # what a dataclass says of itself
         lines = [_parameter(name, *declared) for name, declared in element.parameters().items()]
         # As text: a formula's v[k] is no markup.
         table.add_row(kind, Text(about), Text("\n".join(lines) or "–"))

@@ -7,15 +7,29 @@ import math
 from haploop.protocol.scene.hand_force import Sine, Trace
 from haploop.protocol.scene.scene import Scene, Wall
 
+_SAMPLES = 10_001
+
+
+def _extremes_N(scene: Scene) -> tuple[float, float]:
+    """Returns the least and the largest force of the hand; of a kind that is not haploop's own, among samples of it."""
+    force = scene.hand.force if scene.hand else None
+    if force is None:
+        return 0.0, 0.0
+    if isinstance(force, Trace):
+        return min(force.force), max(force.force)
+    if isinstance(force, Sine):
+        return force.offset - abs(force.amplitude), force.offset + abs(force.amplitude)
+    if math.isfinite(force.constant_from_s()):
+        return force.value, force.value  # pyright: ignore[reportAttributeAccessIssue]
+    import numpy as np
+
+    samples = force.force_at(np.linspace(0.0, scene.duration, _SAMPLES))
+    return float(samples.min()), float(samples.max())
+
 
 def most_force_N(scene: Scene) -> float:
     """Returns the largest force of the hand, to either side."""
-    force = scene.hand.force if scene.hand else None
-    if force is None:
-        return 0.0
-    if isinstance(force, Trace):
-        return max(map(abs, force.force))
-    return abs(force.amplitude) + abs(force.offset) if isinstance(force, Sine) else abs(force.value)
+    return max(map(abs, _extremes_N(scene)))
 
 
 def inward(wall: Wall) -> float:
@@ -24,14 +38,9 @@ def inward(wall: Wall) -> float:
 
 def inward_force_N(scene: Scene) -> float:
     """Returns the largest force of the hand towards the wall; 0 where it has none."""
-    force = scene.hand.force if scene.hand else None
-    if force is None or scene.wall is None:
+    if scene.wall is None:
         return 0.0
-    sign = inward(scene.wall)
-    if isinstance(force, Trace):
-        return max(0.0, *(sign * each for each in force.force))
-    at_most_N = abs(force.amplitude) + sign * force.offset if isinstance(force, Sine) else sign * force.value
-    return max(0.0, at_most_N)
+    return max(0.0, *(inward(scene.wall) * force_N for force_N in _extremes_N(scene)))
 
 
 def start_depth_m(scene: Scene) -> float:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from haploop.launch.plan.meant.loop import LOOP, SOFTEST_N_M
 from haploop.launch.plan.meant.reach import REACH
-from haploop.launch.plan.meant.rule import Note
+from haploop.launch.plan.meant.rule import Found, Note, Rule
+from haploop.protocol.plugin_file import raised_in_file
+from haploop.protocol.register import UnknownKind
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 
@@ -32,9 +34,21 @@ def note_unmeant(scene: Scene) -> list[Note]:
         for key, least, most, unit in _USUAL
         if (value := value_at(scene, key)) and not least <= abs(value) <= most
     ]
-    broken = [(rule, rule.broken(scene)) for rule in RULES]
+    broken = [(rule, _broken(rule, scene)) for rule in RULES]
     return unusual + [
         Note(rule.sentence.format(**found), rule.key.format(**found), rule.keeps_off)
         for rule, found in broken
         if found is not None
     ]
+
+
+def _broken(rule: Rule, scene: Scene) -> Found | None:
+    """Asks a rule; one says nothing that asks a wall or a force that is not at hand, or whose code raises."""
+    try:
+        return rule.broken(scene)
+    except UnknownKind:
+        return None
+    except Exception as error:
+        if raised_in_file(error):  # the run will tell it
+            return None
+        raise

@@ -13,7 +13,7 @@ from haploop.launch.plan.meant.hand_and_wall import (
     wall_moves,
 )
 from haploop.launch.plan.meant.rule import Found, Rule
-from haploop.protocol.scene.hand_force import Sine, constant_from_s
+from haploop.protocol.scene.hand_force import Trace, constant_from_s
 from haploop.protocol.scene.scene import Scene, hand_is_unmodelled
 
 # A force does next to nothing against friction of which it is no more than this share, or a spring that it stretches by
@@ -115,7 +115,8 @@ def _pushed_away(scene: Scene) -> Found | None:
     held = hand and hand.stiffness and hand.rest != scene.device.position
     if wall is None or hand is None or held or scene.event or scene.others or start_depth_m(scene) >= 0.0:
         return None
-    sign, value_N = inward(wall), getattr(hand.force, "value", 0.0)
+    lasts = hand.force is not None and math.isfinite(hand.force.constant_from_s())
+    sign, value_N = inward(wall), getattr(hand.force, "value", 0.0) if lasts else 0.0
     away = value_N * sign < 0.0 and scene.device.velocity * sign <= 0.0
     return {"force_N": value_N} if away else None
 
@@ -128,7 +129,8 @@ def _not_held_there(scene: Scene) -> Found | None:
     hand, device, wall = scene.hand, scene.device, scene.wall
     if hand is None or wall is None or hand_is_unmodelled(scene) or not hand.stiffness or not hand.force:
         return None
-    moves = isinstance(hand.force, Sine) or scene.others or scene.noise or wall_moves(scene)
+    changes = math.isinf(hand.force.constant_from_s()) and not isinstance(hand.force, Trace)
+    moves = changes or scene.others or scene.noise or wall_moves(scene)
     if moves or start_depth_m(scene) >= -count_m(scene) or any(of(scene) is not None for of in _KEPT_OFF):
         return None
     way_m = (wall.position - hand.rest) * inward(wall) - count_m(scene)

@@ -1,0 +1,129 @@
+"""Stand-ins for what a run had of packages and files that are not here: they hold its numbers, and do nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import make_dataclass
+from typing import Annotated, Any, ClassVar, TypeGuard
+
+from haploop.controller.dissipation import Element, registry
+from haploop.controller.dissipation.element import hint_of
+from haploop.controller.estimators.base import Estimator
+from haploop.controller.estimators.choose import estimator_class
+from haploop.protocol.installed import all_brought, bring, take_back
+from haploop.protocol.quantity import Quantity
+from haploop.protocol.register import UnknownKind
+from haploop.protocol.scene.hand_force import FORCES, HandForce, UnknownForce
+from haploop.protocol.scene.scene import NO_ELEMENT
+from haploop.protocol.scene.table import Tables
+from haploop.protocol.walls.registry import wall_class
+from haploop.protocol.walls.wall import Wall
+
+_OF_WALL, _OF_ESTIMATE = {"kind", "position", "stiffness", "occupies"}, {"estimator", "source", "cutoff"}
+
+
+@contextmanager
+def standing_in(tables: Tables) -> Iterator[None]:
+    """Lets a scene be read whose wall, estimators and hand force are not at hand, with the numbers that it gives."""
+    known = all_brought()
+    wall, hand = tables.get("wall"), tables.get("hand")
+    for table in [wall] if isinstance(wall, dict) else []:
+        if _is_missing(wall_class, name := table.get("kind")):
+            body = {"kind": name, "keys": _numbers(table, _OF_WALL)}
+            fields = [(key, Any, None) for key in body["keys"]]
+            made = make_dataclass("StandIn", fields, bases=(_Wall,), namespace=body, frozen=True)
+            bring({Wall.group: {name: made}})
+    for of in ("velocity", "acceleration"):
+        table = tables.get(of)
+        if isinstance(table, dict) and _is_missing(estimator_class, name := table.get("estimator")):
+            body = {"name": name, "keys": _numbers(table, _OF_ESTIMATE), "takes": tuple(table)}
+            bring({Estimator.group: {name: type("StandIn", (_Estimator,), body)}})
+    force = hand.get("force") if isinstance(hand, dict) else None
+    if isinstance(force, dict) and _is_missing(FORCES.find, name := force.get("kind")):
+        hints = {key: Annotated[float, quantity] for key, quantity in _numbers(force, {"kind"}).items()}
+        body = {"kind": name, "__annotations__": hints, "__module__": __name__}
+        bring({HandForce.group: {name: type("StandIn", (UnknownForce,), body)}})
+    try:
+        yield
+    finally:
+        take_back(known)
+
+
+def _is_missing(find: Callable[[str], type], name: Any) -> TypeGuard[str]:
+    if not isinstance(name, str):
+        return False
+    try:
+        find(name)
+    except UnknownKind:
+        return True
+    return False
+
+
+def _numbers(table: Tables, apart: set[str]) -> dict[str, Quantity]:
+    return {key: Quantity("") for key in table if key not in apart and key.isidentifier()}
+
+
+class _Wall(Wall):
+    """Pushes by nothing that is known."""
+
+    def push(self, depth: Any, speed: Any) -> Any:
+        return depth * float("nan")
+
+    def stored(self, depth: Any) -> Any:
+        return depth * float("nan")
+
+
+class _Estimator(Estimator):
+    """Estimates nothing that is known."""
+
+    does: ClassVar[str] = "that of a kind which is not here"
+
+    @classmethod
+    def from_scene(cls, scene: Any, of: str, period_s: float) -> Any:
+        raise UnknownKind(f"The estimator {cls.name} is not here.")
+
+    def start(self, u: Any, sample: Any) -> Any:
+        raise UnknownKind(f"The estimator {self.name} is not here.")
+
+    def step(self, memory: Any, u: Any, sample: Any) -> Any:
+        raise UnknownKind(f"The estimator {self.name} is not here.")
+
+
+def elements_for(tables: Tables) -> dict[str, type[Element]]:
+    """Makes an element for each kind that a scene names and that is not installed, with the values that it gives."""
+    given: dict[str, dict[str, list[Any]]] = {}
+    for table in _elements(tables):
+        values = given.setdefault(table["kind"], {})
+        for name in table:
+            if name.isidentifier() and name not in ("kind", "acts"):
+                values.setdefault(name, []).append(table[name])
+    events = tables.get("event")
+    sets = [event.get("set") for event in events if isinstance(event, dict)] if isinstance(events, list) else []
+    later = [value for each in sets if isinstance(each, dict) for value in each.values()]
+    made = {}
+    for kind, values in given.items():
+        hints = {name: hint_of(Quantity("", choices=_choices(of, later))) for name, of in values.items()}
+        body = {"kind": kind, "force": lambda self, motion: 0.0, "__annotations__": hints}
+        made[kind] = type("StandIn", (Element,), body)
+    return made
+
+
+def _choices(values: list[Any], later: list[Any]) -> tuple[str | bool, ...]:
+    """Returns what a parameter with these values may be: no choices of a number, all texts there are of a text."""
+    if any(isinstance(value, bool) for value in values):
+        return False, True
+    if not any(isinstance(value, str) for value in values):
+        return ()
+    return tuple(dict.fromkeys(value for value in (*values, *later) if isinstance(value, str)))
+
+
+def _elements(tables: Tables) -> Iterator[Tables]:
+    installed = registry()
+    lists = [tables.get(key) for key in ("dissipation", "event")]
+    entries = [entry for one in lists if isinstance(one, list) for entry in one if isinstance(entry, dict)]
+    for entry in entries:
+        table = entry.get("swap", entry)
+        kind = table.get("kind") if isinstance(table, dict) else None
+        if isinstance(kind, str) and kind not in (*installed, NO_ELEMENT):
+            yield table

@@ -1,0 +1,80 @@
+"""Wall, estimators and hand force of a plugin file, tried before anything depends on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from haploop.controller.estimators.base import Estimator
+from haploop.controller.estimators.choose import make_estimators
+from haploop.protocol.installed import brought
+from haploop.protocol.plugin_file import PluginError, raised_in_file
+from haploop.protocol.scene.hand_force import HandForce
+from haploop.protocol.scene.scene import Scene
+from haploop.protocol.ticks import Timebase
+from haploop.protocol.walls.registry import make_wall
+from haploop.protocol.walls.wall import Wall
+
+_DEPTHS_M, _TIMES_S = (0.0, 1e-4), (0.0, 0.5, 3.0)
+
+
+def is_of_file(group: str, name: str | None) -> bool:
+    """Tells whether a scene's name is that of a class that a plugin file has brought into this process."""
+    return name is not None and name in brought(group)
+
+
+def names_of_files(scene: Scene) -> bool:
+    """Tells whether a scene names a wall or a hand force of a plugin file, which plant or logger need."""
+    force = scene.hand and scene.hand.force
+    return is_of_file(Wall.group, scene.wall and scene.wall.kind) or is_of_file(HandForce.group, force and force.kind)
+
+
+def try_kinds(scene: Scene) -> None:
+    """Has what a scene names of a file give a number at rest, as elements do when they are tried.
+
+    Raises:
+        PluginError: one raised, or gave no finite number; the sentence has the file and the line.
+    """
+    if scene.wall and is_of_file(Wall.group, scene.wall.kind):
+        what = f"The wall {scene.wall.kind}"
+        wall = _tried(what, "be made", lambda: make_wall(scene.wall))
+        for depth in (*_DEPTHS_M, np.array(_DEPTHS_M)):  # of the controller, and of the books
+            of = f"at {'an array of depths' if isinstance(depth, np.ndarray) else f'a depth of {depth:g} m'}"
+            _tried(what, f"push {of}", lambda depth=depth: wall.push(depth, 0.0 * depth))
+            _tried(what, f"tell what it has stored {of}", lambda depth=depth: wall.stored(depth))
+    for of in ("velocity", "acceleration"):
+        if is_of_file(Estimator.group, name := scene.estimate(of).estimator):
+            _tried(f"The estimator {name}", "estimate", lambda of=of: _estimate(scene, of))
+    if scene.hand and scene.hand.force and is_of_file(HandForce.group, scene.hand.force.kind):
+        _try_force(scene.hand.force)
+
+
+def _estimate(scene: Scene, of: str) -> Any:
+    velocity, acceleration, _ = make_estimators(scene, Timebase.from_scene(scene).period_s)
+    made = velocity if of == "velocity" else acceleration
+    return made.step(made.start(0.0, (0.0, 0.0)), 0.0, (0.0, 0.0))[1]
+
+
+def _try_force(force: HandForce) -> None:
+    what, t = f"The hand force {force.kind}", np.array(_TIMES_S)
+    for times in (t, t[:, None]):  # as in a run, and as in a batch
+        values = _tried(what, "give the force at an array of times", lambda times=times: force.force_at(times))
+        if np.shape(values) != times.shape:
+            raise PluginError(
+                f"{what} gave an array of the shape {np.shape(values)} for times of the shape {times.shape}; force_at "
+                "must return one force for each time."
+            )
+
+
+def _tried(what: str, do: str, call: Callable[[], Any]) -> Any:
+    try:
+        value = call()
+        is_fine = isinstance(value, Wall) or bool(np.isfinite(np.asarray(value, float)).all())
+    except Exception as error:
+        why = raised_in_file(error) or f"{type(error).__name__}: {error}"
+        raise PluginError(f"{what} could not {do} when it was tried: {why}.") from error
+    if not is_fine:
+        raise PluginError(f"{what} gave {value}, which is no finite number, when it was to {do}.")
+    return value
