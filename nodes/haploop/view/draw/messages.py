@@ -69,8 +69,23 @@ class Table:
 
 
 @lru_cache(maxsize=64)
-def _named(columns: tuple[Column, ...]) -> list[dict[str, str]]:
-    return [column._asdict() for column in columns]
+def _named(columns: tuple[Column, ...]) -> str:
+    """Returns the entries of columns as JSON, written once: they are most of a header, and seldom others."""
+    return _COMPACT.encode([column._asdict() for column in columns])
+
+
+def _entry(table: Table) -> str:
+    """Returns the entry of a table in the header, as JSON."""
+    numbers = {
+        "name": table.name,
+        "t0_s": table.t0_s,
+        "dt_s": table.dt_s,
+        "rows": table.values.shape[1],
+        "envelope": table.envelope,
+        "last": finite(table.last),
+        **finite(table.more),
+    }
+    return f'{{"columns":{_named(tuple(table.columns))},{_COMPACT.encode(numbers)[1:]}'
 
 
 def encode(from_s: float, to_s: float, tables: Sequence[Table], **more: Any) -> bytes:
@@ -80,21 +95,9 @@ def encode(from_s: float, to_s: float, tables: Sequence[Table], **more: Any) -> 
     floats, padded with zeros; all little-endian. Header and tables each begin at a multiple of 8 bytes, so that a
     browser reads the columns in place. ``more`` are further entries of the header.
     """
-    entries = [
-        {
-            "name": table.name,
-            "t0_s": table.t0_s,
-            "dt_s": table.dt_s,
-            "rows": table.values.shape[1],
-            "columns": _named(tuple(table.columns)),
-            "envelope": table.envelope,
-            "last": finite(table.last),
-            **finite(table.more),
-        }
-        for table in tables
-    ]
-    header = {"from_s": from_s, "to_s": to_s, "tables": entries, **finite(more)}
-    head = _COMPACT.encode(header).encode()
+    entries = ",".join(_entry(table) for table in tables)
+    numbers = {"from_s": from_s, "to_s": to_s, **finite(more)}
+    head = f'{{"tables":[{entries}],{_COMPACT.encode(numbers)[1:]}'.encode()
     head += b" " * (-(4 + len(head)) % 8)
     parts = [len(head).to_bytes(4, "little"), head]
     with np.errstate(over="ignore", invalid="ignore"):  # beyond what a float32 holds is infinite on the screen too

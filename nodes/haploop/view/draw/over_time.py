@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import compress
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -23,6 +24,8 @@ _MEASURED = {"wall_position": Column("wall", "m", "wall"), "x_measured": Column(
 Part = tuple[LodSeries, Mapping[str, Column]]
 # Which columns are worth showing, as truth values, from their values in the interval, shape (columns, rows).
 AreShown = Callable[[Sequence[Column], np.ndarray], np.ndarray]
+# A table over time before its rows: its name, its parts, and which of its columns are shown.
+Planned = tuple[str, list[Part], AreShown | None]
 
 
 def are_there(_: Sequence[Column], values: np.ndarray) -> np.ndarray:
@@ -65,7 +68,8 @@ class Interval:
     def _last(self, wanted: Sequence[tuple[LodSeries, Sequence[str]]]) -> np.ndarray:
         """Returns columns at the beginning of the newest tick that all series know; NaN where it is not in full."""
         tick = min([self._end, *(series.end_tick for series, _ in wanted)]) - 1
-        return np.concatenate([series.rows(names, tick, tick + 1)[:, 0] for series, names in wanted])
+        found = [series.rows(names, tick, tick + 1)[:, 0] for series, names in wanted]
+        return np.concatenate(found) if len(found) > 1 else found[0]
 
     def _bucket(self, all_series: list[LodSeries]) -> int:
         """Returns the ticks of a bucket: the least power of two that leaves no more buckets than there is room for."""
@@ -76,12 +80,12 @@ class Interval:
         return bucket
 
 
-def _position(history: History) -> tuple[str, list[Part], AreShown | None]:
+def _position(history: History) -> Planned:
     moving = {name: Column(name, "m", label) for name, label in _BODIES.items() if name in history.steps.names}
     return "position", [(history.steps, moving), (history.ticks, _MEASURED)], None
 
 
-def _force(history: History) -> tuple[str, list[Part], AreShown]:
+def _force(history: History) -> Planned:
     """Lists wall, elements by place and total, each shown where it has values in the interval."""
     columns = {"wall": Column("wall", "N", "wall")} if history.at_work.wall else {}
     for name, place, kind in sorted(by_place(history, "element"), key=lambda element: int(element[1])):
@@ -98,7 +102,7 @@ def by_place(history: History, what: str) -> Iterator[tuple[str, str, str]]:
             yield name, place, kind
 
 
-def _energy(history: History) -> tuple[str, list[Part], AreShown]:
+def _energy(history: History) -> Planned:
     """Lists the books of the wall, of the elements at work, and of those whose energy changes in the interval."""
     columns = {WALL_BOOK: Column("wall", "J", "wall")} if history.at_work.wall else {}
     books = [name.removesuffix(TRUE) for name in history.energy.names if name.endswith(TRUE) and name != WALL_BOOK]
@@ -109,11 +113,11 @@ def _energy(history: History) -> tuple[str, list[Part], AreShown]:
     }
     columns["residual"] = Column("residual", "J", "residual")
     always = {"wall", "residual", *at_work}
+    is_kept = np.array([known.name in always for known in columns.values()])
 
-    def are_shown(columns: Sequence[Column], values: np.ndarray) -> np.ndarray:
+    def are_shown(_: Sequence[Column], values: np.ndarray) -> np.ndarray:
         finite = np.where(np.isfinite(values), values, np.nan)
         least, greatest = np.fmin.reduce(finite, axis=1), np.fmax.reduce(finite, axis=1)
-        is_kept = np.array([known.name in always for known in columns])
         return (least < greatest) | (is_kept & (least == greatest))
 
     return "energy", [(history.energy, columns)], are_shown
@@ -142,9 +146,21 @@ def own_columns(history: History) -> list[Part]:
     ]
 
 
+# What is planned of a history, and for which elements, wall and columns: the same for thousands of pictures.
+_PLANS: WeakKeyDictionary[History, tuple[tuple[object, ...], list[Planned]]] = WeakKeyDictionary()
+
+
+def _plan(history: History) -> list[Planned]:
+    made_for = history.at_work, len(history.opened), *(series.opened for series in history.all_series)
+    known = _PLANS.get(history)
+    if known is None or known[0] != made_for:
+        known = _PLANS[history] = made_for, [planned(history) for planned in (_position, _force, _energy)]
+    return known[1]
+
+
 def over_time(history: History, interval: Interval) -> list[Table | None]:
     """Returns position, force and energy."""
-    return [interval.table(*made(history)) for made in (_position, _force, _energy)]
+    return [interval.table(*planned) for planned in _plan(history)]
 
 
 def overview(history: History) -> Table | None:

@@ -88,20 +88,21 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     if len(lacking) and lacking[-1] < recent.shape[1] - 1:  # not received: what is no number stays so to the end
         begin = held + int(lacking[-1]) // n + 1
         by = f"what is missing before {begin / rate:g} s"
+        recent = recent[:, (begin - held) * n :]
     so_far = end - begin < window
     first = max(begin, end - window)
     if end - first < 4:
         return Sight("settling", _WHY["settling"].format(window=WINDOW_S, begin=by), first / rate, end / rate, True)
     long_first = max(begin, end - _LONG * window)
-    x, force = history.steps.rows(("x", "force"), first, end)
-    slow = history.steps.rows(("x",), long_first, end)[0][::n]
+    slow, slow_force = recent[:, ::n]
+    x, force = recent[:, (first - long_first) * n :]
     if not (np.isfinite(x).all() and np.isfinite(force).all() and np.isfinite(slow).all()):
         return Sight("not finite", _WHY["not finite"], first / rate, end / rate)
     swing_m = max(resolution_m, SMALLEST_SWING_M)
     (fast, fast_growth), (crossings, growth) = _swings(x, swing_m), _swings(slow, swing_m)
     # Of a swing that is over the newest window knows nothing, though a longer look back still holds it.
     if fast >= CROSSINGS or np.ptp(x) <= swing_m:
-        crossings, growth, long_first, slow = fast, fast_growth, first, x[::n]
+        crossings, growth, long_first, slow, slow_force = fast, fast_growth, first, x[::n], force[::n]
     seen_s = (end - long_first) / rate
     width, ripple = float(np.ptp(slow)), float(np.ptp(_flat(force)))
     if not inside[-window:].any():
@@ -115,7 +116,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
         word = "force ripples" if ripple > most else "no swing seen"
     so_far_word, word = word, "settling" if so_far else word
     line = main_line(slow, rate) if width > 2.0 * swing_m else None
-    line = line or (main_line(history.steps.rows(("force",), long_first, end)[0][::n], rate) if ripple else None)
+    line = line or (main_line(slow_force, rate) if ripple else None)
     why = _WHY[word].format(
         window=WINDOW_S, begin=by, seen=seen_s, crossings=crossings, growth=growth, swing_um=swing_m * 1e6,
         width_um=width * 1e6, ripple_N=ripple,

@@ -39,7 +39,7 @@ def ingest(history: History, frames: Sequence[tuple[str, Frame]]) -> Message:
             tick, now = frame.fields
             {"plant": history.steps, "controller": history.ticks, "logger": history.energy}[role].begin(tick)
             if role == "controller" and now["history"]:  # all there is of a run that stands still
-                history.at_work = AtWork.of_block(now["history"][-1])
+                history.at_work = history.at_work_in(now["history"][-1])
             status = now if role == "logger" and now else status
         elif frame.name.endswith("_BLOCK"):
             blocks.setdefault(frame.name, []).append(block := frame.as_dict())
@@ -94,7 +94,7 @@ def _controller(history: History, run: list[Block]) -> None:
         for name, unit in element.get("columns", {}).items()
     }
     names = [*_OF_CONTROLLER, *(f"dissipation.{place}" for place in range(len(elements))), *units]
-    history.append_ticks(run[0]["from_tick"], _joined(run, names), AtWork.of_block(run[0]), units)
+    history.append_ticks(run[0]["from_tick"], _joined(run, names), history.at_work_in(run[0]), units)
 
 
 def _energy(history: History, run: list[Block]) -> None:

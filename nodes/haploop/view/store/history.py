@@ -80,6 +80,14 @@ class History:
         self.stop_tick: int | None = None
         self.version = 0
         self._end_state: dict[str, np.ndarray] = {}
+        self._told: tuple[object, AtWork] = None, self.at_work
+
+    def at_work_in(self, block: Block) -> AtWork:
+        """Returns what was at work in a block of the controller; read once where block after block tells the same."""
+        told = block["elements"], block["wall"]
+        if told != self._told[0]:
+            self._told = told, AtWork.of_block(block)
+        return self._told[1]
 
     @property
     def first_tick(self) -> int | None:

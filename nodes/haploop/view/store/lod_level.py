@@ -58,7 +58,8 @@ class Ring:
         """Returns room for ``count`` values more, at most the capacity, (columns, count), which the caller fills."""
         used = self.end - self.start
         if used + count > self._values.shape[1]:
-            self._values[:, : self.capacity] = self._values[:, used - self.capacity : used]
+            for column in self._values:  # one by one they are moved in place, all at once by way of a copy
+                column[: self.capacity] = column[used - self.capacity : used]
             self.start, used = self.end - self.capacity, self.capacity
         self.end += count
         return self._values[:, used : used + count]

@@ -10,12 +10,16 @@ from haploop.view.store.lod_level import LodLevel, Ring, extremes
 
 # Buckets of a level that make one of the next: fewer levels cost less, and twice the buckets make up for it.
 FOLD = 4
-# Rows of a bucket of the first coarse level, at least.
-_LEAST_ROWS = 4
+# Rows and ticks of a bucket of the first coarse level, at least: finer ones reach no further back than the rows.
+_LEAST_ROWS, _LEAST_TICKS = 16, 4
 # Buckets that a coarse level holds at least, two values each.
 _BUCKETS = 4096
 # Ticks for which buckets are made at once, and buckets of the coarser levels; fewer are not worth the calls.
-_AT_ONCE_TICKS, _AT_ONCE_BUCKETS = 128, 8
+_AT_ONCE_TICKS, _AT_ONCE_BUCKETS = 128, 64
+# So few values are looked at row by row: the calls for level upon level would take longer.
+_FEW_VALUES = 8192
+# Envelopes that are kept, of which the next ones of the same names and buckets make what is new alone.
+_MOST_KNOWN = 16
 # Ticks of ranges that are taken from another series at once.
 _RANGES_AT_ONCE = 4096
 # Columns that are kept, at most: elements come and go.
@@ -31,6 +35,7 @@ class LodSeries:
     logarithm of the run's length alone.
 
     Attributes:
+        opened: number of columns that were ever added: ``names`` are the same as long as it is.
         first_tick: first tick that is known; None before anything is.
         end_tick: the tick before which every tick is known, or never will be.
         full_from_tick: the tick from which on rows are held in full.
@@ -39,8 +44,11 @@ class LodSeries:
     def __init__(self, rows_per_tick: int, recent_ticks: int, origin: int) -> None:
         self.rows_per_tick, self.origin = rows_per_tick, origin
         self.first_tick: int | None = None
+        self.opened = 0
         self._columns: dict[str, int] = {}
         self._found: dict[tuple[str, ...], tuple[list[int], np.ndarray]] = {}
+        # By names and ticks of a bucket: the first tick of the last envelope, and those of its buckets that are full.
+        self._known: dict[tuple[tuple[str, ...], int], tuple[int, np.ndarray]] = {}
         self._levels = [LodLevel(Ring(recent_ticks * rows_per_tick, 0), 1, rows_per_tick)]
         self._add_level()
         # No level is given more at once than half of what it surely holds, so that nothing is lost on the way up.
@@ -63,7 +71,7 @@ class LodSeries:
         return self.origin + self._levels[0].start
 
     def _add_level(self) -> None:
-        first = max(1, _LEAST_ROWS // self.rows_per_tick)
+        first = max(_LEAST_TICKS, _LEAST_ROWS // self.rows_per_tick)
         ticks = self._levels[-1].ticks * FOLD if len(self._levels) > 1 else first
         self._levels.append(LodLevel(Ring(2 * _BUCKETS, len(self._columns)), ticks, 2))
 
@@ -93,6 +101,8 @@ class LodSeries:
     def _open(self, name: str, present: Collection[str]) -> None:
         """Adds a column; where there are too many, in place of the oldest that is not present any more."""
         self._found.clear()
+        self._known.clear()
+        self.opened += 1
         if len(self._columns) < MOST_COLUMNS:
             self._columns[name] = len(self._columns)
             for level in self._levels:
@@ -203,24 +213,41 @@ class LodSeries:
             Shape (names, 2 * buckets).
         """
         found = np.full((len(names), (to_tick - from_tick) // bucket_ticks * 2), np.nan)
-        at, end, filled = from_tick - self.origin, min(to_tick, self.end_tick) - self.origin, 0
+        begin, known = self._known.pop(key := (tuple(names), bucket_ticks), (from_tick, found[:, :0]))
+        passed = (from_tick - begin) // bucket_ticks * 2
+        known = known[:, passed : passed + found.shape[1]] if passed >= 0 else known[:, :0]
+        found[:, : known.shape[1]] = known
+        end = min(to_tick, self.end_tick)
+        self._fill(found, known.shape[1], names, from_tick, end, bucket_ticks)
+        if len(self._known) == _MOST_KNOWN:
+            del self._known[next(iter(self._known))]
+        self._known[key] = from_tick, found[:, : max(0, (end - from_tick) // bucket_ticks * 2)]
+        return found
+
+    def _fill(
+        self, found: np.ndarray, filled: int, names: Sequence[str], from_tick: int, to_tick: int, bucket_ticks: int
+    ) -> None:
+        """Fills in an envelope from column ``filled`` on, up to the last bucket that has begun."""
+        at, end = from_tick + filled // 2 * bucket_ticks - self.origin, to_tick - self.origin
         # From the coarsest level that is fine enough on; what has not been propagated to it comes from the finer ones.
         levels = [(level, level.end) for level in reversed(self._levels) if level.ticks <= bucket_ticks]
+        rows, few = self._levels[0], _FEW_VALUES // (self.rows_per_tick * max(1, len(names)))
         for level, known in levels:
+            if level is not rows and end - at <= few and rows.start <= at:
+                continue
             buckets = (min(known, end) - at) // bucket_ticks
             if buckets > 0:
                 values = level.between(at, at + buckets * bucket_ticks)
                 group = bucket_ticks // level.ticks * level.values
-                done = level is not self._levels[0] and group == 2
+                done = level is not rows and group == 2
                 found[:, filled : filled + 2 * buckets] = self._picked(values, names, 0 if done else group)
                 at, filled = at + buckets * bucket_ticks, filled + 2 * buckets
         rest = []
-        for level, known in levels:
+        for level, known in levels[-1:] if end - at <= few and rows.start <= at else levels:
             until = min(known, end // level.ticks * level.ticks)
             if until > at:
                 rest.append(level.between(at, until))
                 at = until
         if rest:
-            values = np.concatenate(rest, axis=1)
+            values = np.concatenate(rest, axis=1) if len(rest) > 1 else rest[0]
             found[:, filled : filled + 2] = self._picked(values, names, values.shape[1])
-        return found
