@@ -34,7 +34,7 @@ def test_whatever_a_scene_can_hold_survives_the_way_through_toml(tables):
     assert same(tomllib.loads(to_toml(tables)), tables)
 
 
-@pytest.mark.parametrize("value", [None, float("nan"), float("inf"), {1, 2}, b"x"])
+@pytest.mark.parametrize("value", [None, {1, 2}, b"x"])
 def test_what_a_scene_cannot_hold_is_refused(value):
     with pytest.raises(TypeError, match="A scene holds text, numbers"):
         to_toml({"a": {"b": [value]}})

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from haploop.controller.active_elements import ActiveElement
 from haploop.controller.asked import Declared, Told, answer_of, first_memory
-from haploop.controller.dissipation.element import ASKABLE, Motion, raised
+from haploop.controller.dissipation.element import Motion, raised
 from haploop.controller.estimators.base import Estimator, Sample
 from haploop.protocol.arrays import where
 from haploop.protocol.walls.wall import Wall
@@ -63,10 +63,8 @@ class NoForce(Exception):
     def sentence(self, params: ControllerParams, tick: int) -> str:
         """Returns what happened at this tick, with the element's kind and what it raised."""
         element, cause = params.elements[self.index].element, self.__cause__
-        name = getattr(cause, "name", None)
-        hint = f' It is told what it names in its class: asks = ("{name}",).' if name in ASKABLE else ""
         what = raised(cause, type(element))
-        return f"Element {self.index} ({element.kind}) gave no force at tick {tick}: {what}.{hint}"
+        return f"Element {self.index} ({element.kind}) gave no force at tick {tick}: {what}."
 
 
 def as_number(force: Any) -> float:

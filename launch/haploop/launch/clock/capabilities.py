@@ -30,11 +30,18 @@ def units_at(scene: Scene, kinds: Mapping[str, type[Element]]) -> dict[str, str]
     return of_kinds | {key: number.quantity.unit for key, number in settable_at(scene, kinds).items()}
 
 
+def as_typed(value: object) -> str:
+    """Returns the words of a value as a scene and a command take them."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
 def in_words(scene: Scene, kinds: Mapping[str, type[Element]], values: Mapping[str, Any]) -> dict[str, str]:
     """Returns values of settable keys, in SI units, with their units; all digits, so that they can be set again."""
     numbers = settable_at(scene, kinds)
-    words = {key: str(value).lower() if isinstance(value, bool) else str(value) for key, value in values.items()}
-    return {key: f"{word.removesuffix('.0')} {numbers[key].quantity.unit}".strip() for key, word in words.items()}
+    return {
+        key: f"{as_typed(value).removesuffix('.0')} {numbers[key].quantity.unit}".strip()
+        for key, value in values.items()
+    }
 
 
 def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> Message:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from haploop.controller.dissipation import ElementError, PluginError
 from haploop.launch.clock import device_time
 from haploop.launch.clock.arguments import check_burden, check_names
-from haploop.launch.clock.capabilities import capabilities, in_words, units_at
+from haploop.launch.clock.capabilities import as_typed, capabilities, in_words, units_at
 from haploop.launch.clock.clock import Clock, ClockError
 from haploop.launch.clock.pace import PaceError, pace_of
 from haploop.launch.clock.plugin_swap import swap_plugin
@@ -213,7 +213,7 @@ class Commands:
             self._undo_by.append((self._clock.newest, None, None))
             return text, data
         back = before[element].as_dict() if element < len(before) else {"kind": NO_ELEMENT}
-        words = " ".join([back["kind"], *(f"{key}={value}" for key, value in back.items() if key != "kind")])
+        words = " ".join([back["kind"], *(f"{key}={as_typed(back[key])}" for key in back if key != "kind")])
         where = f" --element {element}" if element else ""
         undo: Event = {"swap": back, "element": element}
         self._undo_by.append((self._clock.newest, undo, code))

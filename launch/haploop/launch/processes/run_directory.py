@@ -122,21 +122,21 @@ def has_launcher(run: LiveRun) -> bool:
 
 
 def find(which: str | Elsewhere | None) -> LiveRun:
-    """Returns the run with this id (or its beginning), the only one there is, or that which answers elsewhere.
+    """Returns the run with this id (or its beginning) or name, the only one there is, or that which answers elsewhere.
 
     Raises RunNotFound where not one fits, or the one elsewhere cannot be reached.
     """
     if isinstance(which, Elsewhere):
         return _reach(which)
     run_id, runs = which, live_runs()
-    fitting = [run for run in runs if run_id is None or run.id.startswith(run_id)]
+    fitting = [run for run in runs if run_id is None or run.id.startswith(run_id) or run.title == run_id]
     if len(fitting) == 1:
         return fitting[0]
     listing = "\n".join(f"  {run.id}  {run.title}" for run in runs)
     if not runs:
         raise RunNotFound("No run is live; start one with haploop run SCENE.")
     if not fitting:
-        raise RunNotFound(f"No live run has the id {run_id}; these are live:\n{listing}")
+        raise RunNotFound(f"No live run has the id or the name {run_id}; these are live:\n{listing}")
     raise RunNotFound(f"{len(fitting)} runs are live; name one with --run ID:\n{listing}")
 
 

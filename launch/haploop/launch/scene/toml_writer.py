@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -31,7 +30,7 @@ def inline(value: Any) -> str:
     """Returns one value on one line, as TOML writes it."""
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, int) or (isinstance(value, float) and math.isfinite(value)):
+    if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, str):
         return f'"{value.translate(_ESCAPES)}"'

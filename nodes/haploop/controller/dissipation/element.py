@@ -42,7 +42,9 @@ def raised(error: BaseException | None, kind: type[Element] | None = None) -> st
     """Returns what an element raised, with the file and the line of its code."""
     if kind and kind.memory is not None and "unpack" in str(error) and not places_of(error):
         return f"TypeError: force must return the force and the memory, as in: return f, memory{place_in(kind)}"
-    return f"{type(error).__name__}: {error}{place_in(kind, error)}"
+    name = getattr(error, "name", None)
+    hint = f'. An element is told what it names in its class: asks = ("{name}",)' if name in ASKABLE else ""
+    return f"{type(error).__name__}: {error}{place_in(kind, error)}{hint}"
 
 
 # What an element may ask for beside the motion, which it is told then.

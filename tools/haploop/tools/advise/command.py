@@ -11,13 +11,13 @@ from pathlib import Path
 
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.toml_writer import to_toml
-from haploop.launch.spec import make_output
+from haploop.launch.spec import OutputError, make_output
 from haploop.logger.summary import finite
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.tools.advise.advice import Advice, AdviceData, advice, advice_data
 from haploop.tools.advise.figure import draw
 from haploop.tools.advise.report import report, sentences
-from haploop.tools.advise.subject import InvalidRequest, make_subject
+from haploop.tools.advise.subject import InvalidRequest, Subject, make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop
 from haploop.tools.advise.walls.store import Store
 from haploop.tools.advise.walls.trial import Trial
@@ -26,8 +26,14 @@ from haploop.tools.cli.scenes import kinds_with, print_notes
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.terminal import console
 
-ADVICE, FIGURE, WALLS = "advice.json", "figure.png", "walls.jsonl"
+ADVICE, FIGURE, WALLS, _ASKED = "advice.json", "figure.png", "walls.jsonl", "asked.toml"
 _SCENE, _BREAKS = "advice.toml", "advice_breaks.toml"
+
+
+_OF_ANOTHER = (
+    "{out} holds an advice on another scene, {asked}; name another directory with --out, or give the device and the "
+    "options of that advice to go on with it."
+)
 
 
 def advise(
@@ -55,7 +61,7 @@ def advise(
         # The stiffness of a loop that is searched is a place holder.
         tried = with_value(tried, "wall.stiffness", value_at(asked.scene, "wall.stiffness"))
         asked = replace(asked, notes=(*print_notes(tried, kinds), *asked.notes))
-        out = _output(out, asked.name)
+        out = _output(out, asked)
         store = Store(out / WALLS)
         try:
             with _progress() as (stage, on_progress), Trial(store, workers, on_progress) as trial:
@@ -71,11 +77,18 @@ def advise(
         print(path, file=sys.stderr)
 
 
-def _output(out: Path | None, name: str) -> Path:
-    """Returns a new directory, or one with the walls of an advice, which then goes on; OutputError for any other."""
-    if out is not None and (out / WALLS).exists():
-        return out
-    return make_output(out, Path(f"advice-{name}"), first=WALLS)
+def _output(out: Path | None, asked: Subject) -> Path:
+    """Returns a new directory, or one with the walls of an advice on the same scene, which then goes on.
+
+    Raises OutputError for one that holds anything else.
+    """
+    scene = to_toml(asked.scene.as_dict())
+    if out is None or not (out / WALLS).exists():
+        out = make_output(out, Path(f"advice-{asked.name}"), first=WALLS)
+        (out / _ASKED).write_text(scene, encoding="utf-8")
+    elif not (out / _ASKED).exists() or (out / _ASKED).read_text(encoding="utf-8") != scene:
+        raise OutputError(_OF_ANOTHER.format(out=out, asked=out / _ASKED))
+    return out
 
 
 def _write(found: Advice, out: Path) -> AdviceData:

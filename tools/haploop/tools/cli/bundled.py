@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -80,4 +81,5 @@ def new(
         except SceneError:
             file.unlink()
             raise
-    print(f"Next: haploop run {file}, haploop explain {file}, haploop advise {file}.")
+    name = shlex.quote(str(file))
+    print(f"Next: haploop run {name}, haploop explain {name}, haploop advise {name}.")

@@ -14,7 +14,7 @@ from haploop.tools.cli.options import FAILED, leave, plain_errors, what_was_logg
 SCENE, FIGURE = "demo", "figure.png"
 
 _NEXT = (
-    'A word holds for this scene alone. Next: haploop advise {scene} --set "event=[]" tries other hands, delays and '
+    'A word holds for this scene alone. Next: haploop advise {scene} --set "event=[]" tries other holds, delays and '
     "devices (minutes); haploop new my.toml, haploop replay {directory}, haploop run {scene} --view."
 )
 

@@ -13,8 +13,8 @@ _BUZZ: dict[Word, str] = {
     "buzzes": "The recording buzzes: it swings at {frequency}, {width} peak to peak at most, {when}; "
     "pauses of less than half a second are not told.",
     "none seen": (
-        "No buzz was seen: no{other} swing at one frequency above {above:g} Hz lasts {lasts:g} s and is wide enough to "
-        "be felt. Swings at several frequencies at once are not looked for."
+        "No{other} swing at one frequency above {above:g} Hz was seen that lasts {lasts:g} s and is wide enough to be "
+        "felt. Slower ones, and swings at several frequencies at once, are not looked for."
     ),
     "cannot say": (
         "Whether the recording buzzes cannot be said: that takes {lasts:g} s without a gap, and {rate:g} samples a "

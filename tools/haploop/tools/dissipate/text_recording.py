@@ -13,7 +13,7 @@ from haploop.launch.scene.units import scale_of
 from haploop.tools.dissipate.delimited import Column, DelimitedFile
 from haploop.tools.dissipate.plausible import Largest
 from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
-from haploop.tools.dissipate.stamps import Stamps, stamps
+from haploop.tools.dissipate.stamps import ONE_MISSING, Stamps, is_late, stamps
 
 # Names of columns that are looked for where none is given.
 _TIMES = ("t", "time", "timestamp", "time_s", "t_s", "seconds")
@@ -29,7 +29,7 @@ _FAR_APART_S = 0.1
 _IN_METRES = ("position_m", "x_m")
 # Periods above which there is a gap between two samples, and below which a single one is missing; deviation above which
 # a period is uneven.
-_GAP, _ONE_MISSING, _UNEVEN = 1.5, 2.5, 0.1
+_GAP, _UNEVEN = 1.5, 0.1
 # Steps before and after a sample that repeats the one before, in counts: a device this fast does not stand still.
 _MOVING_COUNTS = 3.0
 # No quantity of a device is greater, in SI units.
@@ -180,7 +180,7 @@ class TextRecording:
             self._widen(columns["position"])
             steps = np.diff(t, prepend=t[:1] if last_s is None else last_s)
             self._refuse_disorder(t, steps, lines, last_s)
-            is_gap = steps > self._longest_s
+            is_gap = (steps > self._longest_s) & ~is_late(steps, self.period_s)
             is_gap[0] |= last_s is None
             self.notes.uneven += int((np.abs(steps[~is_gap] - self.period_s) > self._uneven_s).sum())
             for at in np.flatnonzero(is_gap):
@@ -236,7 +236,8 @@ class TextRecording:
     def _bridged(self, columns: dict[str, Floats], lines: Floats) -> tuple[dict[str, Floats], Floats]:
         """Returns the rows with the mean of both neighbours where a single one is missing between them."""
         steps = np.diff(columns["time"])
-        at = np.flatnonzero((steps > self._longest_s) & (steps < _ONE_MISSING * self.period_s)) + 1
+        longer = (steps > self._longest_s) & (steps < ONE_MISSING * self.period_s)
+        at = np.flatnonzero(longer & ~is_late(steps, self.period_s)) + 1
         self.notes.bridged += len(at)
         whole = {
             name: np.insert(column, at, column[at - 1] / 2.0 + column[at] / 2.0) for name, column in columns.items()

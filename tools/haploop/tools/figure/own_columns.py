@@ -55,7 +55,8 @@ def draw_own_columns(body: SubFigure, grid: GridSpec, row: int, run: RunData) ->
         factor, letter = prefix_for(largest) if unit in _PREFIXED else (1.0, "")
         names = list(dict.fromkeys(part.column for part in shown))
         for part in shown:
-            label = f"{part.column} of {run.history.elements[part.element].name}"
+            name = run.history.elements[part.element].name
+            label = name if len(names) == 1 else f"{part.column} of {name}"
             look = {"linestyle": _DASHES[names.index(part.column) % len(_DASHES)]}
             line(ax, part.t_s, part.values / factor, label, style.element_colour(part.element), held=True, **look)
         ax.set_xlim(*run.span_s)

@@ -89,7 +89,7 @@ def legend(ax: Axes, only: tuple[str, ...] = (), spare: tuple[str, ...] = (), **
     """
     named = [(handle, label) for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)]
     named = [(handle, label) for handle, label in named if label in only or not only]
-    room = _ROOM_LETTERS - _TITLE_LETTER * len(ax.get_title(loc="left"))
+    room = _ROOM_LETTERS * _share_of_widest(ax) - _TITLE_LETTER * len(ax.get_title(loc="left"))
     while not where and sum(len(label) + _HANDLE_LETTERS for _, label in named) > room:
         labels = [label for _, label in named]
         del named[next((labels.index(label) for label in spare if label in labels), -1)]
@@ -98,6 +98,14 @@ def legend(ax: Axes, only: tuple[str, ...] = (), spare: tuple[str, ...] = (), **
         place = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": len(named), "frameon": False} | where
         look = {"fontsize": SMALL, "borderaxespad": 0.2, "handlelength": 1.6, "columnspacing": 1.0}
         ax.legend(handles, labels, **look, **place)
+
+
+def _share_of_widest(ax: Axes) -> float:
+    """Returns the width of the column of axes in its grid, as a share of the widest column's."""
+    if not (spec := ax.get_subplotspec()):
+        return 1.0
+    widths = [float(width) for width in spec.get_gridspec().get_width_ratios()]  # pyright: ignore[reportGeneralTypeIssues]
+    return widths[spec.colspan.start] / max(widths)
 
 
 def corner_legend(ax: Axes) -> None:
