@@ -60,7 +60,7 @@ def drawn(seed: int, before: bool, after: bool) -> tuple[float, BuzzFinder]:
     draw = np.random.default_rng(seed)
     period_s, lasts_s = float(draw.choice([1e-3, 5e-4])), draw.uniform(1.3, 3.0)
     begins_s, quiet_s = before * draw.uniform(0.6, 1.0), after * draw.uniform(0.6, 1.0)
-    t = np.arange(round((begins_s + lasts_s + quiet_s) / period_s)) * period_s
+    t: Floats = np.arange(float(round((begins_s + lasts_s + quiet_s) / period_s))) * period_s
     on = (t >= begins_s) & (t < begins_s + lasts_s)
     width = 2e-4 * np.exp(draw.uniform(-0.3, 0.3) * t) * on
     noise = 1e-6 * draw.standard_normal(len(t))
