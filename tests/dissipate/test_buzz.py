@@ -55,6 +55,36 @@ def test_a_buzz_is_told_at_its_frequency_on_a_hands_motion_noise_and_counts(
     assert buzz.stretches == ((0.0, pytest.approx(S[-1], abs=0.125)),)
 
 
+def drawn(seed: int, before: bool, after: bool) -> tuple[float, BuzzFinder]:
+    """A drawn short recording and how long it truly buzzes, s; with or without quiet before and after."""
+    draw = np.random.default_rng(seed)
+    period_s, lasts_s = float(draw.choice([1e-3, 5e-4])), draw.uniform(1.3, 3.0)
+    begins_s, quiet_s = before * draw.uniform(0.6, 1.0), after * draw.uniform(0.6, 1.0)
+    t: Floats = np.arange(float(round((begins_s + lasts_s + quiet_s) / period_s))) * period_s
+    on = (t >= begins_s) & (t < begins_s + lasts_s)
+    width = 2e-4 * np.exp(draw.uniform(-0.3, 0.3) * t) * on
+    noise = 1e-6 * draw.standard_normal(len(t))
+    hand = 1e-3 * np.sin(2.0 * np.pi * 0.7 * t)
+    x_m = counted(width * np.sin(2.0 * np.pi * draw.uniform(20.0, 90.0) * t + draw.uniform(0.0, 6.0)) + hand + noise)
+    return min(begins_s + lasts_s, float(t[-1])) - begins_s, finder(x_m, t, period_s=period_s)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "most"), [(False, False, 1e-9), (True, False, 0.07), (False, True, 0.07), (True, True, 0.08)]
+)
+def test_a_buzz_lasts_as_long_as_it_does_and_to_the_very_end_of_a_short_recording(
+    before: bool, after: bool, most: float
+) -> None:
+    errors = []
+    for seed in range(40):
+        lasts_s, found = drawn(seed, before, after)
+        buzz = found.buzz()
+        assert buzz is not None
+        errors.append(buzz.lasts_s / lasts_s - 1.0)
+    assert max(map(abs, errors)) < most
+    assert abs(np.mean(errors)) < 0.015
+
+
 @pytest.mark.parametrize("begins_s", [1.0, 1.3, 2.0, 2.4])
 def test_a_buzz_begins_when_it_does_within_a_fifth_of_a_second(begins_s: float) -> None:
     buzz = finder(counted(swing(31.0, 2.6e-4) * (begins_s < S) - 2e-3 * np.minimum(S, 1.0))).buzz()

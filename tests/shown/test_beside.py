@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.bundled import of_name
+from haploop.protocol.scene.paths import with_value
 from haploop.tools.cli.app import app
 from haploop.tools.cli.runs_beside import difference_table
 from haploop.tools.figure.data import RunData
@@ -189,6 +190,24 @@ def test_the_close_view_of_runs_of_unlike_length_is_where_all_of_them_are(runs, 
     )
     assert closer.get_xlim()[1] <= given[0].span_s[1] + 0.01
     assert len(artists(closer, "position")) == 2
+
+
+def test_below_an_overlay_the_notes_of_each_run_stand_with_its_name_and_shared_ones_once(runs):
+    plain, odd = data(runs, "a", "bare")
+    soft = replace(odd, scene=with_value(odd.scene, "wall.stiffness", 15.0))
+
+    def below(*given: RunData) -> list[str]:
+        return [text.get_text() for text in artists(make_overlay(given, "abcde"[: len(given)]), "note")]
+
+    note = "A note on its scene: wall.stiffness is 15 N/m; is that the unit that was meant?"
+    assert below(plain, plain) == []
+    assert [line.partition(" Haptic")[0] for line in below(plain, soft)] == [f"b: {note}"]
+    assert [line.partition(" Haptic")[0] for line in below(soft, plain, soft)] == [f"a, c: {note}"]
+    assert [line.partition(" Haptic")[0] for line in below(soft, soft)] == [f"all runs: {note}"]
+    failed = replace(plain, summary=plain.summary | {"ended": "failed", "why": "The plant failed: " + "x y " * 60})
+    lines = below(*[soft] * 4, failed)
+    assert lines[1].startswith("e: The plant failed: x y")
+    assert max(map(len, lines)) < 200
 
 
 def test_each_overlay_has_a_file_of_its_own_in_the_first_directory(runs):

@@ -110,6 +110,7 @@ def test_run_with_view_serves_the_run_and_stays_until_ctrl_c(launched, tmp_path,
     assert state["summary"]["ticks"] == 4000
     assert state["pace"] == 1.0
     run.says("Ctrl-C ends it")
+    run.says("The run is over; its page stays at http")
     viewers = [pid for pid, parent, _, _ in processes() if parent == run.pid]
     assert len(viewers) == 1
     run.signal(signal.SIGINT)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import make_dataclass
-from typing import Annotated, Any, ClassVar, TypeGuard
+from typing import Annotated, Any, ClassVar
 
 from haploop.controller.dissipation import Element, registry
 from haploop.controller.dissipation.element import hint_of
@@ -27,20 +27,15 @@ _OF_WALL, _OF_ESTIMATE = {"kind", "position", "stiffness", "occupies"}, {"estima
 def standing_in(tables: Tables) -> Iterator[None]:
     """Lets a scene be read whose wall, estimators and hand force are not at hand, with the numbers that it gives."""
     known = all_brought()
-    wall, hand = tables.get("wall"), tables.get("hand")
-    for table in [wall] if isinstance(wall, dict) else []:
-        if _is_missing(wall_class, name := table.get("kind")):
-            body = {"kind": name, "keys": _numbers(table, _OF_WALL)}
-            fields = [(key, Any, None) for key in body["keys"]]
-            made = make_dataclass("StandIn", fields, bases=(_Wall,), namespace=body, frozen=True)
-            bring({Wall.group: {name: made}})
+    if (name := _missing(wall_class, wall := _table(tables, "wall"), "kind")) is not None:
+        body = {"kind": name, "keys": _numbers(wall, _OF_WALL)}
+        fields = [(key, Any, None) for key in body["keys"]]
+        bring({Wall.group: {name: make_dataclass("StandIn", fields, bases=(_Wall,), namespace=body, frozen=True)}})
     for of in ("velocity", "acceleration"):
-        table = tables.get(of)
-        if isinstance(table, dict) and _is_missing(estimator_class, name := table.get("estimator")):
+        if (name := _missing(estimator_class, table := _table(tables, of), "estimator")) is not None:
             body = {"name": name, "keys": _numbers(table, _OF_ESTIMATE), "takes": tuple(table)}
             bring({Estimator.group: {name: type("StandIn", (_Estimator,), body)}})
-    force = hand.get("force") if isinstance(hand, dict) else None
-    if isinstance(force, dict) and _is_missing(FORCES.find, name := force.get("kind")):
+    if (name := _missing(FORCES.find, force := _table(_table(tables, "hand"), "force"), "kind")) is not None:
         hints = {key: Annotated[float, quantity] for key, quantity in _numbers(force, {"kind"}).items()}
         body = {"kind": name, "__annotations__": hints, "__module__": __name__}
         bring({HandForce.group: {name: type("StandIn", (UnknownForce,), body)}})
@@ -50,14 +45,20 @@ def standing_in(tables: Tables) -> Iterator[None]:
         take_back(known)
 
 
-def _is_missing(find: Callable[[str], type], name: Any) -> TypeGuard[str]:
-    if not isinstance(name, str):
-        return False
+def _table(tables: Tables, key: str) -> Tables:
+    table = tables.get(key)
+    return table if isinstance(table, dict) else {}
+
+
+def _missing(find: Callable[[str], object], table: Tables, key: str) -> str | None:
+    """Returns the name at a key of a table where it is that of nothing at hand."""
+    name = table.get(key)
     try:
-        find(name)
+        if isinstance(name, str):
+            find(name)
     except UnknownKind:
-        return True
-    return False
+        return name
+    return None
 
 
 def _numbers(table: Tables, apart: set[str]) -> dict[str, Quantity]:

@@ -20,7 +20,11 @@ ESTIMATORS: dict[str, str | type[Estimator]] = {
     "kalman": "haploop.controller.estimators.kalman:Kalman",
 }
 _REGISTER: Register[Estimator] = Register("estimator", Estimator.group, ESTIMATORS)
-estimator_class = _REGISTER.find
+
+
+def estimator_class(name: str) -> type[Estimator]:
+    """Returns the estimator of a name; UnknownKind for none."""
+    return _REGISTER.find(name)
 
 
 @cached_until_brought

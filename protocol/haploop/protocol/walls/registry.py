@@ -14,7 +14,16 @@ WALLS: dict[str, str | type[Wall]] = {
     "texture": "haploop.protocol.walls.texture:Texture",
 }
 _REGISTER: Register[Wall] = Register("wall of the kind", Wall.group, WALLS)
-wall_class, all_walls = _REGISTER.find, _REGISTER.all
+
+
+def wall_class(name: str) -> type[Wall]:
+    """Returns the wall of a name; UnknownKind for none."""
+    return _REGISTER.find(name)
+
+
+def all_walls() -> dict[str, type[Wall]]:
+    """Returns every wall by its name; all are imported."""
+    return _REGISTER.all()
 
 
 def class_of(table: WallTable | None) -> type[Wall]:

@@ -85,7 +85,7 @@ def check(
 
 
 def plugins(plugin: Plugin = None, json: Json = False) -> None:
-    """List the dissipation elements with their parameters, and what else a file brings."""
+    """List the elements, and what else a file brings, with parameters."""
     from haploop.protocol.installed import all_brought
 
     with plain_errors():

@@ -26,6 +26,8 @@ SINCE = ("start", "now")
 UntilClosed = Annotated[bool, typer.Option("--until-closed", help="end once the page is closed, not with Ctrl-C")]
 _AT = "The page is at {} ({} ends it)"
 _ENDS = ("Ctrl-C", "closing it")
+_STAYS = "The run is over; its page {} until {}."
+_UNTIL = ("Ctrl-C ends it here", "it is closed, or Ctrl-C ends it here")
 # A run waits so long for its viewer.
 _HELD_S = 10.0
 # A viewer steps back where a run wants the processor.
@@ -178,8 +180,9 @@ class Viewer:
         if not (process := self._process):
             return
         with contextlib.suppress(KeyboardInterrupt):
-            if self._link and process.poll() is None:
-                print(_AT.format(self._link, _ENDS[self._until_closed]), file=sys.stderr, flush=True)
+            if process.poll() is None:
+                where = f"stays at {self._link}" if self._link else "is on its way and stays"
+                print(_STAYS.format(where, _UNTIL[self._until_closed]), file=sys.stderr, flush=True)
             process.wait()
         assert process.stdin
         with contextlib.suppress(OSError):

@@ -21,6 +21,8 @@ _RESOLVED_HZ = 1.0 / _WINDOW_S
 _SHARE = 0.8
 # The staircase of an encoder swings by less than a count, here the step that nine of ten exceed.
 _COUNTS, _SMALLEST = 2.0, 10.0
+# It goes on to the end of a part whose last half second it swings through, this share of the window before as wide.
+_GOES_ON = 0.9
 # It lasts so long, and does not decay below this share meanwhile: what is struck rings shorter.
 LASTS_S, _KEPT = 1.0, 0.7
 # Where its velocity jumps, as at a wall, a slower periodic motion has overtones, at multiples k of its frequency, of no
@@ -122,14 +124,17 @@ class BuzzFinder:
         self.slow: Line | None = None
         # Windows that swing, in stretches without one that does not or has another frequency.
         self._stretches: list[list[_Window]] = [[]]
-        # Of the last window of a part without a gap, where a swing that ends in it did, and its end.
-        self._last_s, self._part_ends_s = (0.0, 0.0), dict[float, float]()
+        # Of the last window of a part without a gap, where a swing that ends in it did -> the end of the part.
+        self._part_ends_s = dict[float, float]()
+        # Where in what is kept, which begins with the last window, the next one does.
+        self._next = 0
         self._left_out: list[Overtone] = []
 
     def add(self, piece: Samples) -> None:
         """Takes a piece; its times tell a rate that its period is only about."""
         if piece.begins:
-            self._part_ends_s |= {self._last_s[0]: self._last_s[1]}
+            self._part_ends_s |= self._end_of_part()
+            self._next = 0
             self._t_s, self._motion = np.empty(0), np.empty((3, 0))
             self._begins_s = float(piece.t_s[0])
             self._stretches.append([])
@@ -141,11 +146,11 @@ class BuzzFinder:
         rows = piece.x_m, piece.true_x_m, np.full(len(piece.x_m), np.nan) if force is None else force
         self._t_s, self._motion = np.append(self._t_s, piece.t_s), np.hstack([self._motion, rows])
         self.longest_s = max(self.longest_s, float(self._t_s[-1]) - self._begins_s)
-        while len(self._t_s) >= self._size:
+        while len(self._t_s) >= self._next + self._size:
+            self._t_s, self._motion = self._t_s[self._next :], self._motion[:, self._next :]
             x_m, true_x_m, force_N = self._motion[:, : self._size]
             self._look(self._t_s[: self._size], x_m, true_x_m, force_N, delay_s)
-            hop = self._size // _HOPS
-            self._t_s, self._motion = self._t_s[hop:], self._motion[:, hop:]
+            self._next = self._size // _HOPS
 
     def _look(self, t_s: Floats, x_m: Floats, true_x_m: Floats, force_N: Floats, delay_s: float) -> None:
         from_s, to_s = float(t_s[0]), float(t_s[-1])
@@ -163,7 +168,19 @@ class BuzzFinder:
             begins_s = from_s if from_s == self._begins_s else from_s + inside_s
             fed = None if np.isnan(force_N).any() else fed_W(true_x_m, force_N, rate_Hz, line.frequency_Hz, delay_s)
             last.append(_Window(begins_s, to_s - inside_s, line, fed))
-        self._last_s = to_s - inside_s, to_s
+
+    def _end_of_part(self) -> dict[float, float]:
+        """Returns the end of this part, by that of its last window, where it swings on to there; else nothing.
+
+        The windows end up to a quarter of one earlier.
+        """
+        if not (last := self._stretches[-1]) or not self._next:
+            return {}
+        t_s, x_m = self._t_s[-self._size :], self._motion[0, -self._size :]
+        line, before = swing(x_m, (len(t_s) - 1) / float(t_s[-1] - t_s[0])), last[-1].line
+        if line is None or abs(line.frequency_Hz - before.frequency_Hz) >= _RESOLVED_HZ:
+            return {}
+        return {last[-1].to_s: float(t_s[-1])} if line.width >= _GOES_ON * before.width else {}
 
     def buzz(self) -> Buzz | None:
         """Returns the buzz; None where there was none, or nothing can be said.
@@ -186,7 +203,7 @@ class BuzzFinder:
         fed = [window.fed for window in told if window.fed is not None]
         given_W, moved_W = np.mean(fed, axis=0).tolist() if fed else (None, 0.0)
         # What still swings at the end of a part goes on to it.
-        ends_s = self._part_ends_s | {self._last_s[0]: self._last_s[1]}
+        ends_s = self._part_ends_s | self._end_of_part()
         return Buzz(
             float(np.median(swings_Hz)),
             0.5 * _RESOLVED_HZ,

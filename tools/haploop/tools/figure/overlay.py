@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from haploop.launch.plan.effects import notes
 from haploop.tools.figure import style
 from haploop.tools.figure.data import Book, FigureError, RunData
-from haploop.tools.figure.run_figure import badge, key_numbers
+from haploop.tools.figure.run_figure import badge, failure, key_numbers
 from haploop.tools.figure.run_labels import labels
 from haploop.tools.figure.run_names import run_names, shortened
 from haploop.tools.figure.time import MM, line
+from haploop.tools.render.report import noted
 from haploop.tools.render.units import amount, prefix_for
 
 if TYPE_CHECKING:
@@ -26,6 +29,8 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#332288")
 _WIDTHS = (2.8, 2.1, 1.6, 1.2, 0.9, 0.6)
 # A longer name of a file is cut.
 _LONGEST_NAME = 150
+# Of the notes below the figure.
+_LINE_LETTERS, _LINE_INCHES = 195, 0.2
 
 
 def draw_overlay(directories: Sequence[Path], target: Path | None = None) -> Path:
@@ -51,10 +56,12 @@ def draw_overlay(directories: Sequence[Path], target: Path | None = None) -> Pat
 
 def make_overlay(runs: Sequence[RunData], names: Sequence[str]) -> Figure:
     """Makes the figure of several runs and their names; FigureError where matplotlib is missing."""
-    figure = style.empty_figure(15.0, 9.0 + 0.25 * len(runs))
+    below = _notes_below(runs, names)
+    figure = style.empty_figure(15.0, 9.0 + 0.25 * len(runs) + _LINE_INCHES * len(below))
     told = labels(runs, names)
     rows = len(runs) + (is_titled := len({run.scene.title for run in runs}) == 1)
-    header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.02 + 0.025 * rows, 1.0))[:, 0]
+    heights = 0.02 + 0.025 * rows, 1.0, 0.001 + 0.022 * len(below)
+    header, body, footer = figure.subfigures(3, 1, squeeze=False, height_ratios=heights)[:, 0]
     span_s = min(run.span_s[0] for run in runs), max(run.span_s[1] for run in runs)
     ends_s = min(run.span_s[1] for run in runs)  # where all have something to show
     close_s = max(run.close_s() for run in runs if run.span_s[1] - ends_s < 1.5 / run.control_rate)
@@ -71,7 +78,37 @@ def make_overlay(runs: Sequence[RunData], names: Sequence[str]) -> Figure:
     for place, (label, run) in enumerate(zip(told, runs, strict=True)):
         y = 1.0 - (place + is_titled + 0.5) / rows
         _head(header, run, label, y, _COLOURS[place])
+    for place, (words, colours) in enumerate(below):
+        _note(footer, words, colours, 1.0 - (place + 0.5) / len(below))
     return figure
+
+
+def _notes_below(runs: Sequence[RunData], names: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """Returns the lines on why runs failed and what may not be meant in their scenes, with the colours of the runs.
+
+    What is said of several is said once.
+    """
+    told: dict[str, list[int]] = {}
+    for place, run in enumerate(runs):
+        for words in filter(None, (failure(run), noted(notes(run.scene)))):
+            told.setdefault(words, []).append(place)
+    lines: list[tuple[str, list[str]]] = []
+    for words, places in told.items():
+        whose = "all runs" if len(places) == len(runs) else ", ".join(names[place] for place in places)
+        first, *more = textwrap.wrap(f"{whose}: {words}", _LINE_LETTERS)
+        lines += [(first, [_COLOURS[place] for place in places]), *((each, []) for each in more)]
+    return lines
+
+
+def _note(footer: Figure | SubFigure, words: str, colours: Sequence[str], y: float) -> None:
+    """Writes a line below the panels, with a stroke in the colour of each run that it speaks of."""
+    from matplotlib.lines import Line2D
+
+    width = 0.02 / max(1, len(colours))
+    for place, colour in enumerate(colours):
+        ends = [0.008 + place * width, 0.008 + (place + 0.8) * width]
+        footer.add_artist(Line2D(ends, [y, y], color=colour, linewidth=3.0))
+    footer.text(0.034, y, words, fontsize=style.SMALL + 0.5, color=style.INK, va="center", gid="note")
 
 
 def _head(header: Figure | SubFigure, run: RunData, label: str, y: float, colour: str) -> None:
