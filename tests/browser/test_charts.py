@@ -50,6 +50,19 @@ def test_a_run_drawn_behind_that_diverged_leaves_the_axis_to_the_run_on_show(sta
 
 
 @pytest.mark.slow
+def test_the_name_of_a_change_stands_over_the_lines(stand_in, page):
+    """A broad swing at the top of the chart hardly shows through its veil; beside the name it does."""
+    changed = {"tick": 1000, "t_s": 1.0, "kind": "set", "text": "wall.stiffness = 150 N/m"}
+    stand_in.tell({"type": "events", "events": [changed]})
+    stand_in.show(positions([0.01 * (i % 2) for i in range(1601)]))
+    stand_in.drawn()
+    named, beside = seen(page, "position", [0.515, 0.9], "ink")
+    assert beside
+    assert beside[0] < 0.1
+    assert named is None or named[0] > 0.08
+
+
+@pytest.mark.slow
 def test_what_swings_faster_than_there_are_pixels_is_drawn_from_its_least_to_its_greatest(stand_in, page):
     """Also beside a stretch without numbers, which stays empty."""
     rows = [NAN if 700 < i < 900 else 0.01 * (i % 2) for i in range(1601)]

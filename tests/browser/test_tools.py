@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import expect
 
 from helpers.live.browser import IN_BOTH, RGB, order
-from helpers.live.stand_in import OPTIONS, RUNNING, RUNS
+from helpers.live.stand_in import OPTIONS, RUNNING, RUNS, WAITING
 from oracles.snapshots import contact, snapshot, table
 
 # Whether a colour stands in the rows of names of a saved picture: in none of the rows that a chart's canvas takes.
@@ -163,6 +163,19 @@ def test_another_live_run_is_told_and_any_run_can_be_opened_or_drawn_over(stand_
     assert page.input_value("#run") == "fed987", "what has ended is on show still"
     over = order(stand_in, page, lambda: page.select_option("#overlay", "wall-1"))
     assert over == ("overlay", {"run": "wall-1"})
+    expect(page.locator("#behind")).to_be_hidden()
+    stand_in.tell({**RUNS, "overlay": "wall-1"})
+    expect(page.locator("#behind")).to_have_text("over: first wall: steady, 1 Jan 12:00")
+
+
+def test_a_page_without_a_run_offers_nothing_to_save_and_its_charts_take_the_room(stand_in, page):
+    wide = page.locator("#position").bounding_box()["width"]
+    stand_in.show(contact())
+    expect(page.locator("#save-data")).to_be_visible()
+    stand_in.tell(WAITING)
+    expect(page.locator("#save-data")).to_be_hidden()
+    expect(page.locator(".beside")).to_be_hidden()
+    assert page.locator("#position").bounding_box()["width"] > wide + 200
 
 
 @IN_BOTH

@@ -21,26 +21,34 @@ export function marksOf(events) {
   return [...marks.values()].sort((a, b) => a.tick - b.tick);
 }
 
-/** Draw the marks that lie in the chart, labels over the lines of marks; a label that has no room is left out, its line never is. */
-export function drawMarks(u, marks) {
-  const { left, top, width, height } = u.bbox;
+const tone = (mark) => colour(mark.changes ? "mark" : "grey");
+
+/** The marks that lie in a chart, each with its place. */
+function shown(u, marks) {
+  const { left, width } = u.bbox;
   const { min, max } = u.scales.x;
-  const ratio = devicePixelRatio;
-  const { ctx } = u;
-  const free = Array(LANES).fill(-Infinity);
-  ctx.save();
-  ctx.beginPath();
-  ctx.rect(left, top, width, height);
-  ctx.clip();
-  ctx.font = `${TEXT_PX * ratio}px ${FONT}`;
-  ctx.textBaseline = "top";
-  ctx.textAlign = "left";
+  return marks
+    .filter(({ t_s }) => t_s >= min && t_s <= max)
+    .map((mark) => ({ ...mark, x: Math.round(left + ((mark.t_s - min) / (max - min)) * width) + 0.5 }));
+}
+
+/** Has `draw` draw within a chart. */
+function within(u, draw) {
+  const { left, top, width, height } = u.bbox;
+  u.ctx.save();
+  u.ctx.beginPath();
+  u.ctx.rect(left, top, width, height);
+  u.ctx.clip();
+  draw(u.ctx, devicePixelRatio);
+  u.ctx.restore();
+}
+
+/** Draw the lines of the marks, behind those of the chart. */
+export const drawMarks = (u, marks) => within(u, (ctx, ratio) => {
+  const { top, height } = u.bbox;
   ctx.lineWidth = ratio;
-  const shown = marks.filter(({ t_s }) => t_s >= min && t_s <= max);
-  const place = ({ t_s }) => Math.round(left + ((t_s - min) / (max - min)) * width) + 0.5;
-  const tone = (mark) => colour(mark.changes ? "mark" : "grey");
-  for (const mark of shown) {
-    const x = place(mark);
+  for (const mark of shown(u, marks)) {
+    const { x } = mark;
     ctx.strokeStyle = tone(mark);
     ctx.setLineDash(mark.changes ? [] : [2 * ratio, 3 * ratio]);
     ctx.beginPath();
@@ -48,9 +56,16 @@ export function drawMarks(u, marks) {
     ctx.lineTo(x, top + height);
     ctx.stroke();
   }
-  for (const mark of shown) drawLabel(ctx, `${mark.tick} ${mark.words.join(", ")}`, tone(mark), place(mark), u.bbox, free, ratio);
-  ctx.restore();
-}
+});
+
+/** Write the names of the marks over all lines, which a veil behind them lets through; one that has no room is left out. */
+export const nameMarks = (u, marks) => within(u, (ctx, ratio) => {
+  const free = Array(LANES).fill(-Infinity);
+  ctx.font = `${TEXT_PX * ratio}px ${FONT}`;
+  ctx.textBaseline = "top";
+  ctx.textAlign = "left";
+  for (const mark of shown(u, marks)) drawLabel(ctx, `${mark.tick} ${mark.words.join(", ")}`, tone(mark), mark.x, u.bbox, free, ratio);
+});
 
 /** Write a label beside its line, in the first lane that is free there. */
 function drawLabel(ctx, text, tone, x, { left, top, width }, free, ratio) {

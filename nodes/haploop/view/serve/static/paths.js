@@ -73,21 +73,31 @@ const FILLED = 0.5;
 const FAINT = 0.45;
 
 /**
- * A rough line as upright strips, a pixel or two wide: [x, width, top, bottom] each, flat, in canvas pixels; null where the
- * line is smooth or its points lie apart. A pen that goes to and fro thousands of times takes twenty times as long.
+ * A rough line as upright strips: top and bottom of each column of canvas pixels of the chart, NaN where there is none; null
+ * where the line is smooth or its points lie apart. A pen that goes to and fro thousands of times takes twenty times as long.
  */
 export function strips(u, xs, ys) {
   const { x0, kx, left, y1, ky, top } = projection(u);
+  const wide = Math.round(u.bbox.width);
   if (xs.length < POINTS_A_PIXEL * u.bbox.width) return null;
-  const found = [];
+  const [tops, bottoms] = [new Float32Array(wide).fill(NaN), new Float32Array(wide).fill(NaN)];
+  const begin = left - Math.round(left);
   let [at, low, high, y, way, turns, rise] = [NaN, 0, 0, NaN, 0, 0, 0];
+  // A strip goes on to the next one; columns beside the chart are left out, as writing there takes long.
+  const fill = (from, to) => {
+    for (let x = Math.max(0, from), end = Math.min(wide, to); x < end; x++) {
+      tops[x] = low;
+      bottoms[x] = high;
+    }
+  };
   for (let i = 0; i < xs.length; i++) {
-    const px = Math.round(left + (xs[i] - x0) * kx);
+    const px = Math.round(begin + (xs[i] - x0) * kx);
     const py = top + (y1 - ys[i]) * ky;
     const isThere = py - py === 0;
     if (px !== at || !isThere) {
-      if (at === at) found.push(at, isThere ? px - at : 1, low, high);
-      [at, low, high] = isThere ? [px, y < py ? y : py, y > py ? y : py] : [NaN, 0, 0];
+      if (at === at) fill(at, isThere ? px : at + 1);
+      if (isThere) [at, low, high] = [px, y < py ? y : py, y > py ? y : py];
+      else at = NaN;
     } else if (py < low) low = py;
     else if (py > high) high = py;
     if (y === y && isThere) {
@@ -97,60 +107,56 @@ export function strips(u, xs, ys) {
     }
     y = isThere ? py : NaN;
   }
-  if (at === at) found.push(at, 1, low, high);
+  if (at === at) fill(at, at + 1);
   const isBusy = turns * OFTEN_PX * devicePixelRatio > u.bbox.width;
-  return way > (isBusy ? ROUGH / 4 : ROUGH) * u.bbox.height ? found : null;
+  return way > (isBusy ? ROUGH / 4 : ROUGH) * u.bbox.height ? { tops, bottoms } : null;
 }
 
 // Strips are drawn on a sheet of their own, which is laid on the chart: a rectangle for each takes thrice as long.
 const sheet = new OffscreenCanvas(1, 1);
+const paper = sheet.getContext("2d");
 let buffer = new ArrayBuffer(0);
 
 /** Draw strips as wide as a line, and dashed; where they cover the same heights again and again, faintly within edges. */
-export function drawStrips(u, found, { colour: name, width, dash = [] }) {
+export function drawStrips(u, { tops, bottoms }, { colour: name, width, dash = [] }) {
   const pen = Math.max(1, Math.round(width * devicePixelRatio));
-  const [left, wide] = [u.bbox.left, u.bbox.width].map(Math.round);
-  const [low, high, mean] = heights(found);
+  const wide = tops.length;
+  const [low, high, mean] = heights(tops, bottoms);
   const top = Math.max(Math.round(u.bbox.top), Math.floor(low - pen));
   const tall = Math.min(Math.round(u.bbox.top + u.bbox.height), Math.ceil(high + pen)) - top;
   if (!(tall > 0)) return;
   if (buffer.byteLength < 4 * wide * tall) buffer = new ArrayBuffer(4 * wide * tall);
   const pixels = new Uint32Array(buffer, 0, wide * tall).fill(0);
-  const column = (x, from, to, pixel) => {
-    const end = Math.min(tall, to) * wide;
-    for (let at = Math.max(0, from) * wide + x; at < end; at += wide) pixels[at] = pixel;
-  };
   const pattern = dash.flatMap((length, i) => Array(length).fill(i % 2 === 1));
   const [full, faint] = [1, FAINT].map((alpha) => pixelOf(name, alpha));
   const isFaint = mean > FILLED * (high - low);
-  for (let i = 0; i < found.length; i += 4) {
-    const from = Math.round(found[i + 2] - top - pen / 2);
-    const to = Math.max(from + pen, Math.round(found[i + 3] - top + pen / 2));
+  for (let x = 0; x < wide; x++) {
+    if (Number.isNaN(tops[x])) continue;
+    const from = Math.round(tops[x] - top - pen / 2);
+    const to = Math.max(from + pen, Math.round(bottoms[x] - top + pen / 2));
     const isThick = to - from > THICK * pen;
-    const begin = found[i] - left;
-    for (let x = Math.max(0, begin); x < Math.min(wide, begin + found[i + 1]); x++) {
-      const isGap = pattern[Math.floor(x / devicePixelRatio) % pattern.length];
-      const edge = !isGap ? full : isThick ? faint : 0; // a peak is not left out between two dashes
-      column(x, from, to, isFaint && isThick ? faint : edge);
-      if (!isFaint || !isThick) continue;
-      column(x, from, from + pen, edge);
-      column(x, to - pen, to, edge);
-    }
+    const isGap = pattern.length > 0 && pattern[Math.floor(x / devicePixelRatio) % pattern.length];
+    const edge = !isGap ? full : isThick ? faint : 0; // a peak is not left out between two dashes
+    const [inside, below] = isFaint && isThick ? [from + pen, to - pen] : [to, to];
+    let at = Math.max(0, from) * wide + x;
+    for (const end = Math.min(tall, inside) * wide; at < end; at += wide) pixels[at] = edge;
+    for (const end = Math.min(tall, below) * wide; at < end; at += wide) pixels[at] = faint;
+    for (const end = Math.min(tall, to) * wide; at < end; at += wide) pixels[at] = edge;
   }
   if (sheet.width < wide || sheet.height < tall) Object.assign(sheet, { width: wide, height: tall });
-  sheet.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(buffer, 0, 4 * wide * tall), wide, tall), 0, 0);
-  u.ctx.drawImage(sheet, 0, 0, wide, tall, left, top, wide, tall);
+  paper.putImageData(new ImageData(new Uint8ClampedArray(buffer, 0, 4 * wide * tall), wide, tall), 0, 0);
+  u.ctx.drawImage(sheet, 0, 0, wide, tall, Math.round(u.bbox.left), top, wide, tall);
 }
 
 /** Highest and lowest pixel of strips, and their mean height. */
-function heights(found) {
-  let [low, high, sum] = [Infinity, -Infinity, 0];
-  for (let i = 0; i < found.length; i += 4) {
-    if (found[i + 2] < low) low = found[i + 2];
-    if (found[i + 3] > high) high = found[i + 3];
-    sum += found[i + 3] - found[i + 2];
+function heights(tops, bottoms) {
+  let [low, high, sum, count] = [Infinity, -Infinity, 0, 0];
+  for (let x = 0; x < tops.length; x++) {
+    if (tops[x] < low) low = tops[x];
+    if (bottoms[x] > high) high = bottoms[x];
+    if (tops[x] <= bottoms[x]) [sum, count] = [sum + bottoms[x] - tops[x], count + 1];
   }
-  return [low, high, (4 * sum) / found.length];
+  return [low, high, sum / count];
 }
 
 /** A colour of the page as the number of a pixel. */

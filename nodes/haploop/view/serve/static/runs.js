@@ -32,10 +32,11 @@ export class RunChoice {
     this.mark();
   }
 
-  /** The run that is drawn over the one on show: its name, and whether its numbers leave room for others. */
+  /** The run that is drawn over the one on show: its name, what came of it, and whether its numbers leave room for others. */
   behind() {
     const { overlay, past = [], overlay_diverged: diverged } = this.listing ?? {};
-    return { label: `over: ${past.find(({ id }) => id === overlay)?.title ?? overlay}`, fits: !diverged };
+    const { title = overlay, told } = past.find(({ id }) => id === overlay) ?? {};
+    return { label: `over: ${title}`, fits: !diverged, told };
   }
 
   mark() {
@@ -47,6 +48,9 @@ export class RunChoice {
     put(byId("how-many"), others.length === 1 ? "1 other run is live" : `${others.length} other runs are live`);
     byId("open-other").value = others.at(-1)?.id ?? "";
     byId("open-other").title = others.at(-1)?.title ?? "";
+    const { label, told } = this.behind();
+    byId("behind").hidden = !overlay;
+    put(byId("behind"), [label, told].filter(Boolean).join(": "));
   }
 }
 

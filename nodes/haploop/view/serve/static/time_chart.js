@@ -4,7 +4,7 @@ import { amount, named, steady } from "./amounts.js";
 import { bareAxis, bottomAxis, leftAxis } from "./axes.js";
 import { make, onSight, seldom } from "./dom.js";
 import { Legend, stroke } from "./legend.js";
-import { drawMarks, drawMeasured } from "./marks.js";
+import { drawMarks, drawMeasured, nameMarks } from "./marks.js";
 import { ClimbingUnit } from "./climbing.js";
 import { colour } from "./palette.js";
 import { boxes, drawStrips, halfPlane, line as linePath, strips } from "./paths.js";
@@ -102,8 +102,8 @@ export class TimeChart {
       hooks: {
         drawSeries: [(u, i) => this.rough[i] && drawStrips(u, this.rough[i], this.lines[i - 1].line)],
         drawClear: [(u) => this.shade(u)],
-        drawAxes: [(u) => drawMarks(u, this.marks)], // no line is covered by the name of a change
-        draw: [(u) => this.layOver(u), (u) => drawMeasured(u, this.viewport.measured)],
+        drawAxes: [(u) => drawMarks(u, this.marks)],
+        draw: [(u) => this.layOver(u), (u) => nameMarks(u, this.marks), (u) => drawMeasured(u, this.viewport.measured)],
         setCursor: [() => this.tell()],
         setSelect: [(u) => this.select(u)],
       },
