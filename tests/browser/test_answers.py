@@ -27,7 +27,7 @@ def test_a_run_that_never_began_is_told_and_before_the_first_tick_no_loop_is_den
     page = open_page(stand_in.url)
     expect(page.locator("#notice")).to_have_text("Run ab ended before its first tick.")
     for hidden in (".beside", "#scrub"):
-        assert page.locator(hidden).evaluate("e => getComputedStyle(e).visibility") == "hidden"
+        expect(page.locator(hidden)).to_be_hidden()
     stand_in.state(tick=0)
     stand_in.show(snapshot(0.0, 2.0))
     expect(page.locator("#no-ticks")).to_be_visible()
