@@ -7,7 +7,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoints
+    from importlib.metadata import EntryPoint, EntryPoints
 
 Cached = TypeVar("Cached", bound=Callable[..., Any])
 # Classes by group and name, and the text and name of each file that they came from.
@@ -15,6 +15,25 @@ Brought = Mapping[str, Mapping[str, type]]
 _brought: dict[str, dict[str, type]] = {}
 _sources: dict[type, tuple[str, str]] = {}
 _caches: list[Callable[[], None]] = []
+
+
+class PluginError(Exception):
+    """A plugin that cannot be used; the message says why."""
+
+
+def loaded(entry: EntryPoint) -> Any:
+    """Returns what an entry point names.
+
+    Raises:
+        PluginError: it cannot be imported; the message has its name, its group and where it should be.
+    """
+    try:
+        return entry.load()
+    except Exception as error:
+        raise PluginError(
+            f"An installed package names {entry.name!r} ({entry.value}) under {entry.group}, which does not load: "
+            f"{type(error).__name__}: {error}. Mend that package, or uninstall it."
+        ) from error
 
 
 def entry_points_of(group: str) -> EntryPoints:

@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Any
 
 from haploop.protocol.files import read_text
-from haploop.protocol.installed import Brought, bring
+from haploop.protocol.installed import Brought, PluginError, bring
 
 # Elements are handed on from hand to hand, since a swap may change the code of one; all else is known by its name.
 ELEMENTS = "haploop.dissipation"
@@ -24,10 +24,6 @@ _NOTHING = (
     "The plugin {} defines nothing that a scene can name; a class derived from Element, Wall, Estimator or HandForce "
     "was expected."
 )
-
-
-class PluginError(Exception):
-    """A plugin that cannot be used; the message says why."""
 
 
 def bring_file(path: Path) -> Brought:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pkgutil import resolve_name
 from typing import Any, Generic, TypeVar
 
-from haploop.protocol.installed import brought, cached_until_brought, entry_points_of
+from haploop.protocol.installed import brought, cached_until_brought, entry_points_of, loaded
 
 Kind = TypeVar("Kind")
 
@@ -40,6 +40,7 @@ class Register(Generic[Kind]):
 
         Raises:
             UnknownKind: there is none.
+            PluginError: an installed package names it, and it does not load.
         """
         found: Any
         if found := brought(self.group).get(name):
@@ -48,7 +49,7 @@ class Register(Generic[Kind]):
             return resolve_name(found) if isinstance(found, str) else found
         for entry in entry_points_of(self.group):  # whoever uses none of other packages needs no search
             if entry.name == name:
-                return entry.load()
+                return loaded(entry)
         raise UnknownKind(
             f'There is no {self.what} "{name}" here. It comes from a plugin file, which --plugin FILE brings, or from '
             "a package, which must be installed."

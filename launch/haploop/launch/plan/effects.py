@@ -17,7 +17,7 @@ from haploop.launch.plan.effect import CHAIN, COUNTED, HISTORY, LINE, LINEAR_RAT
 from haploop.launch.plan.meant.notes import note_unmeant
 from haploop.launch.plan.meant.rule import Note
 from haploop.plant.integrators.registry import find_integrator, integrator_module, integrator_names
-from haploop.protocol.installed import brought, cached_until_brought, entry_points_of
+from haploop.protocol.installed import brought, cached_until_brought, entry_points_of, loaded
 from haploop.protocol.scene.effects import Accelerometer
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.paths import value_at, without
@@ -165,7 +165,7 @@ EFFECTS: tuple[Effect, ...] = (
 def all_effects() -> tuple[Effect, ...]:
     """Returns the effects of the table and, after them, those of other packages and of plugin files."""
     of_files = [effect for of in ("velocity", "acceleration") for effect in _estimators(of, brought(Estimator.group))]
-    return *EFFECTS, *of_files, *(entry.load() for entry in entry_points_of(_GROUP))
+    return *EFFECTS, *of_files, *(loaded(entry) for entry in entry_points_of(_GROUP))
 
 
 @cached_until_brought

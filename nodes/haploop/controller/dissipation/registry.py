@@ -36,7 +36,10 @@ def registry(
         try:
             kinds[name] = checked(resolve_name(place), f"entry point {name} = {place}")
         except Exception as error:
-            raise PluginError(f"The installed element {name!r} ({place}) does not load: {error}") from error
+            raise PluginError(
+                f"An installed package names {name!r} ({place}) under {ELEMENTS}, which does not load: "
+                f"{type(error).__name__}: {error}. Mend that package, or uninstall it."
+            ) from error
     for path in plugin_files or []:
         kinds.update(load_plugin(path))
     return kinds

@@ -78,9 +78,9 @@ def constant_forces(scene: Scene) -> dict[str, float]:
     """
     if not scene.others:
         return {}
-    from haploop.protocol.installed import entry_points_of
+    from haploop.protocol.installed import entry_points_of, loaded
 
-    return {entry.name: entry.load()(scene) for entry in entry_points_of(_GROUP) if entry.name in scene.others}
+    return {entry.name: loaded(entry)(scene) for entry in entry_points_of(_GROUP) if entry.name in scene.others}
 
 
 def _profile(force: tables.HandForce | None) -> Profile:
