@@ -15,6 +15,7 @@ from haploop.tools.dissipate.buzz import BuzzFinder
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.report import make_report, note_sentences
 from haploop.tools.dissipate.samples import Floats, Samples
+from haploop.tools.dissipate.stamps import Flags
 from helpers.data.recordings import outcome, write
 from helpers.shown import shown
 
@@ -114,6 +115,54 @@ def test_a_gap_in_a_recording_does_not_end_its_buzz() -> None:
     buzz = found.buzz()
     assert buzz is not None
     assert buzz.stretches == ((0.0, pytest.approx(S[-1], abs=0.125)),)
+
+
+def dropped(x_m: Floats, is_kept: Flags, force_N: Floats | None = None) -> BuzzFinder:
+    """Makes the finder that has read the samples that are kept, in pieces between gaps."""
+    found, places = BuzzFinder(1e-3), np.flatnonzero(is_kept)
+    for part in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1):
+        force = None if force_N is None else force_N[part]
+        found.add(Samples(S[part], x_m[part], None, None, x_m[part], None, True, force_N=force))
+    return found
+
+
+@pytest.mark.parametrize("missing", [1, 3, 10])
+@pytest.mark.parametrize("frequency_Hz", [21.0, 73.0, 180.0])
+def test_a_buzz_goes_on_over_gaps_of_few_samples_with_its_frequency_and_width(
+    missing: int, frequency_Hz: float
+) -> None:
+    """Ten samples of 1 ms are nearly two periods of the fastest."""
+    lost = (S > 0.5) & (np.arange(len(S)) % 310 < missing)
+    x_m = swing(frequency_Hz, 2e-4) - 2e-3 * np.minimum(S, 1.0)
+    buzz = dropped(x_m, ~lost).buzz()
+    assert buzz is not None
+    ((from_s, to_s),) = buzz.stretches
+    assert (from_s, to_s) == pytest.approx((0.0, 3.999), abs=0.01)
+    assert buzz.frequency_Hz == pytest.approx(frequency_Hz, abs=0.2)
+    assert buzz.width_m == pytest.approx(4e-4, rel=0.03)
+
+
+@pytest.mark.parametrize("to_s", [3.0, 3.05, 3.1, 3.15, 3.2])
+def test_a_buzz_that_ends_in_mid_recording_did_not_die_down_before(to_s: float) -> None:
+    buzz = finder(swing(73.0, 2e-4) * (to_s > S)).buzz()
+    assert buzz is not None
+    assert buzz.last_m == pytest.approx(4e-4, rel=0.05)
+
+
+def test_a_bridged_gap_is_no_buzz_and_where_half_is_missing_none_is_bridged() -> None:
+    hand = 5e-3 * np.sin(2.0 * np.pi * 1.1 * S)
+    places = np.arange(len(S))
+    assert dropped(hand, places % 60 >= 5).word() == "none seen"
+    assert dropped(swing(73.0, 2e-4), places % 20 >= 10).word() == "cannot say"
+
+
+def test_a_force_between_gaps_is_not_said_to_have_fed_a_swing_over_them() -> None:
+    force_N = -200.0 * swing(73.0, 2e-4)
+    whole, broken = (dropped(swing(73.0, 2e-4), kept, force_N).buzz() for kept in (S >= 0.0, np.arange(4000) % 310 > 2))
+    assert whole is not None
+    assert broken is not None
+    assert whole.fed_W is not None
+    assert broken.fed_W is None
 
 
 def test_a_buzz_whose_frequency_moves_is_told_from_its_least_to_its_greatest(tmp_path: Path) -> None:

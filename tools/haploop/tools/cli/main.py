@@ -7,6 +7,7 @@ import signal
 import sys
 from copy import copy
 
+from haploop.protocol.installed import PluginError
 from haploop.tools.cli.interrupt import SENTENCE, TYPE_CHECKING, LeavingAtOnce
 
 if TYPE_CHECKING:
@@ -42,6 +43,9 @@ def main() -> None:
     except OSError as error:  # one that no command has words of its own for
         print(f"{error.filename or 'A file'} cannot be used: {error.strerror or error}.", file=sys.stderr)
         sys.exit(1)
+    except PluginError as error:  # met where a module is loaded, before a command has begun
+        print(error, file=sys.stderr)
+        sys.exit(2)
     except (KeyboardInterrupt, SystemExit) as error:
         if isinstance(error, SystemExit) and error.code != _OF_TYPER:
             raise

@@ -28,6 +28,9 @@ LASTS_S, _KEPT = 1.0, 0.7
 # Where its velocity jumps, as at a wall, a slower periodic motion has overtones, at multiples k of its frequency, of no
 # more than this over k^2 of its width. They meet the multiple to so many Hz; of the slowest they are too close.
 _OVERTONE, _APART_HZ, _CLOSE_HZ = 3.5, 0.3, 2.5
+# A gap of no more than this, after so many times as many samples without one, is bridged by a straight line: the swing
+# loses no more of its width than the gap is of a window.
+_BRIDGED_S, _BETWEEN = 0.01, 10
 # Samples a second below which noise has too few lines for one to stand out.
 LEAST_RATE_HZ = 200.0
 
@@ -48,7 +51,8 @@ class Buzz:
         stretches: (from, to) of each, a fifth of a second at most too early or late, s.
         width_m: of the widest window, peak to peak, of the sine at its frequency: to 1 % and a tenth of a count beside
             a drift, to 3 % beside a hand's motion fifteen times as wide. Overtones may add some percent.
-        first_m, last_m: widths of the third window, which it fills, and of the last.
+        first_m, last_m: widths of the third window, which it fills, and of the last, or the last but two where it ends
+            before the recording does.
         fed_W: mean power that a recorded force gave to the swing with its overtones, where it fills a window; negative
             where it took; None where none was recorded.
         moved_W: mean of what it would be were force and velocity in phase.
@@ -111,7 +115,7 @@ class BuzzFinder:
         delay_s: from a sample to its force, where one is recorded.
 
     Attributes:
-        longest_s: the longest part without a gap.
+        longest_s: the longest part without a gap that is not bridged.
         slow: the widest line slower than ``ABOVE_HZ``; None of a motion without one.
     """
 
@@ -128,11 +132,15 @@ class BuzzFinder:
         self._part_ends_s = dict[float, float]()
         # Where in what is kept, which begins with the last window, the next one does.
         self._next = 0
+        # Samples since the last gap, bridged or not.
+        self._whole = 0
         self._left_out: list[Overtone] = []
 
     def add(self, piece: Samples) -> None:
         """Takes a piece; its times tell a rate that its period is only about."""
-        if piece.begins:
+        missing = self._bridged(float(piece.t_s[0])) if piece.begins else 0
+        self._whole = len(piece.t_s) + (0 if piece.begins else self._whole)
+        if piece.begins and not missing:
             self._part_ends_s |= self._end_of_part()
             self._next = 0
             self._t_s, self._motion = np.empty(0), np.empty((3, 0))
@@ -143,14 +151,27 @@ class BuzzFinder:
             self.slow = line
         force = piece.force_N if piece.held_N is None else piece.held_N
         delay_s = self._delay_s if piece.held_N is None else 0.0
-        rows = piece.x_m, piece.true_x_m, np.full(len(piece.x_m), np.nan) if force is None else force
-        self._t_s, self._motion = np.append(self._t_s, piece.t_s), np.hstack([self._motion, rows])
+        force = np.full(len(piece.x_m), np.nan) if force is None else force
+        rows = np.vstack([piece.t_s, piece.x_m, piece.true_x_m, force])
+        if missing:
+            before, after = np.append(self._t_s[-1], self._motion[:, -1])[:, None], rows[:, :1]
+            filled = before + (after - before) * np.arange(1.0, missing + 1.0) / (missing + 1.0)
+            filled[-1] = np.nan  # nothing is known of the force
+            rows = np.hstack([filled, rows])
+        self._t_s, self._motion = np.append(self._t_s, rows[0]), np.hstack([self._motion, rows[1:]])
         self.longest_s = max(self.longest_s, float(self._t_s[-1]) - self._begins_s)
         while len(self._t_s) >= self._next + self._size:
             self._t_s, self._motion = self._t_s[self._next :], self._motion[:, self._next :]
             x_m, true_x_m, force_N = self._motion[:, : self._size]
             self._look(self._t_s[: self._size], x_m, true_x_m, force_N, delay_s)
             self._next = self._size // _HOPS
+
+    def _bridged(self, to_s: float) -> int:
+        """Returns how many samples are missing in the gap up to this time; 0 where it is not bridged."""
+        if not len(self._t_s):
+            return 0
+        missing = round((to_s - float(self._t_s[-1])) * self.rate_Hz) - 1
+        return missing if missing <= min(_BRIDGED_S * self.rate_Hz, self._whole / _BETWEEN) else 0
 
     def _look(self, t_s: Floats, x_m: Floats, true_x_m: Floats, force_N: Floats, delay_s: float) -> None:
         from_s, to_s = float(t_s[0]), float(t_s[-1])
@@ -212,7 +233,7 @@ class BuzzFinder:
             _joined([(window.from_s, ends_s.get(window.to_s, window.to_s)) for window in told]),
             width_m,
             told[min(_THIRD, len(told) - 1)].line.width,
-            told[-1].line.width,
+            told[-1 if told[-1].to_s in ends_s else -min(_THIRD + 1, len(told))].line.width,
             given_W,
             moved_W,
         )
