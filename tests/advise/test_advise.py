@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.file import load
+from haploop.launch.scene.toml_writer import to_toml
 from haploop.launch.stability.judge import judge_scene
 from haploop.logger.log.recording import MemoryLog
 from haploop.protocol.scene.paths import value_at, with_value
@@ -138,6 +139,16 @@ def test_a_directory_of_something_else_is_refused(tmp_path):
     done = CliRunner().invoke(app, ["advise", "touch", "--out", str(tmp_path)])
     assert done.exit_code == 2
     assert "must be new or empty" in done.output
+
+
+def test_a_directory_with_an_advice_on_another_scene_is_left_as_it_is(tmp_path):
+    (tmp_path / "walls.jsonl").touch()
+    (tmp_path / "asked.toml").write_text(to_toml(make_subject("falcon").scene.as_dict()))
+    (tmp_path / "advice.json").write_text("{}")
+    done = CliRunner().invoke(app, ["advise", "touch", "--out", str(tmp_path)])
+    assert done.exit_code == 2
+    assert f"{tmp_path} holds an advice on another scene" in done.output
+    assert (tmp_path / "advice.json").read_text() == "{}"
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,21 @@
 """Commands that a terminal, a page or a program may send: refused with a sentence, or done with the way back."""
 
+import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from haploop.controller.dissipation import Element, Motion
+from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.commands import Answer, Commands
 from haploop.launch.clock.roster import Roster
 from haploop.launch.spec import RunSpec
+from haploop.protocol.scene.scene import ElementTable
+from haploop.protocol.ticks import Timebase
 from helpers.runs.clocks import DAMPING, TICKS, clock, granted
 from helpers.scenes.least import KINDS
 
@@ -173,6 +179,27 @@ def test_undo_takes_changes_back_one_by_one_the_last_first() -> None:
     assert [sorted(event.keys() & {"set", "swap"}) for _, event in subject.events[2:]] == [["swap"], ["set"]]
     ok, text, _ = at_once(steer, "undo", {})
     assert (ok, text) == (False, "There is nothing to undo: no swap and no set that a command asked for is left.")
+
+
+class Switched(Element):
+    """f = 0, which may be on or off."""
+
+    kind = "switched"
+    on: bool = True
+
+    def force(self, motion: Motion) -> float:
+        return 0.0
+
+
+def test_the_way_back_to_an_element_that_is_on_is_told_as_a_scene_takes_it() -> None:
+    kinds = {**KINDS, "switched": Switched}
+    present = replace(clock().present(), dissipation=(ElementTable(name="switched", parameters={"on": True}),))
+    subject = Clock(present, Timebase.from_scene(present), kinds, math.inf)
+    granted(subject, 0)
+    steer = Commands(subject, RunSpec(subject.present(), kinds, Path("out")), Roster)
+    ok, text, _ = at_once(steer, "swap", {"swap": DAMPING})
+    assert ok
+    assert text.endswith("; to go back: swap switched acts=in-contact on=true")
 
 
 def test_no_way_back_is_told_where_one_swap_cannot_go_it() -> None:

@@ -16,8 +16,8 @@ from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.logger import read
 from haploop.tools.dissipate.booking import Booking
-from haploop.tools.dissipate.samples import RecordingError
-from haploop.tools.dissipate.text_recording import Layout
+from haploop.tools.dissipate.recording.samples import RecordingError
+from haploop.tools.dissipate.recording.text_recording import Layout
 from helpers.data.recordings import PERIOD_S, booking, outcome, samples, write
 from helpers.scenes.least import KINDS, scene
 

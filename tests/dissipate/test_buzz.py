@@ -11,11 +11,11 @@ import pytest
 from typer.testing import CliRunner
 
 from haploop.tools.cli.app import app
-from haploop.tools.dissipate.buzz import BuzzFinder
 from haploop.tools.dissipate.figure import make_figure
+from haploop.tools.dissipate.recording.samples import Floats, Samples
+from haploop.tools.dissipate.recording.stamps import Flags
 from haploop.tools.dissipate.report import make_report, note_sentences
-from haploop.tools.dissipate.samples import Floats, Samples
-from haploop.tools.dissipate.stamps import Flags
+from haploop.tools.dissipate.swing.finder import BuzzFinder
 from helpers.data.recordings import outcome, write
 from helpers.shown import shown
 

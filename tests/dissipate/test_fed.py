@@ -17,9 +17,9 @@ from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.cli.app import app
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.outcome import Outcome
+from haploop.tools.dissipate.recording.samples import Floats
+from haploop.tools.dissipate.recording.text_recording import Layout
 from haploop.tools.dissipate.report import conclusion, make_report
-from haploop.tools.dissipate.samples import Floats
-from haploop.tools.dissipate.text_recording import Layout
 from helpers.data.recordings import outcome, write
 from helpers.scenes.least import KINDS
 from helpers.shown import shown

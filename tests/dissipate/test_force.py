@@ -15,9 +15,9 @@ from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.cli.app import app
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.outcome import ForceOutcome
+from haploop.tools.dissipate.recording.samples import RecordingError
+from haploop.tools.dissipate.recording.text_recording import Layout
 from haploop.tools.dissipate.report import conclusion, make_report, note_sentences
-from haploop.tools.dissipate.samples import RecordingError
-from haploop.tools.dissipate.text_recording import Layout
 from helpers.data.recordings import outcome, write
 from helpers.scenes.least import KINDS, scene
 from helpers.shown import artists, shown

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from haploop.tools.dissipate.recording.samples import RecordingError
+from haploop.tools.dissipate.recording.text_recording import Layout
 from haploop.tools.dissipate.report import make_report, note_sentences
-from haploop.tools.dissipate.samples import RecordingError
-from haploop.tools.dissipate.text_recording import Layout
 from helpers.data.recordings import T, X, outcome, true_J, write
 from helpers.shown import shown
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from haploop.tools.dissipate.figure import make_figure
+from haploop.tools.dissipate.recording.samples import Floats
+from haploop.tools.dissipate.recording.text_recording import Layout
 from haploop.tools.dissipate.report import doubtful, make_report, note_sentences
-from haploop.tools.dissipate.samples import Floats
-from haploop.tools.dissipate.text_recording import Layout
 from helpers.data.recordings import outcome, write
 from helpers.shown import shown
 
@@ -70,6 +70,19 @@ def test_times_that_are_uneven_are_the_first_thing_said_and_that_energies_may_be
     words = [text.get_text() for part in make_figure(found).subfigs for text in part.texts]
     assert any(each.startswith("Energies and rate may be wrong: ") for each in words)
     assert found.as_data()["times_may_be_wrong"]
+
+
+@pytest.mark.parametrize("missing", [0, 5])
+def test_the_rate_of_scattered_times_is_that_of_their_mean_and_only_what_is_missing_is_told(
+    tmp_path: Path, missing: int
+) -> None:
+    scatter = np.random.default_rng(4).uniform(-0.3e-3, 0.3e-3, 6000)
+    kept = np.ones(6000, bool)
+    kept[1000 : 1000 * missing + 1 : 1000] = False
+    t = (np.arange(6000) * 1e-3 + scatter)[kept]
+    found = outcome(write(tmp_path / "scattered.csv", {"t": t, "x": motion(t)}), dampings=["2"])
+    assert 1.0 / found.recording.period_s == pytest.approx(1000.0, rel=1e-3)
+    assert (found.recording.notes.gaps, found.recording.notes.bridged) == (0, missing)
 
 
 def test_even_times_are_said_to_be_nothing_else(tmp_path: Path) -> None:

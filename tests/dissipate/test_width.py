@@ -13,8 +13,9 @@ from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import read_layers
 from haploop.launch.scene.toml_writer import to_toml
-from haploop.tools.dissipate.buzz import Buzz, BuzzFinder
-from haploop.tools.dissipate.samples import Floats, Samples
+from haploop.tools.dissipate.recording.samples import Floats, Samples
+from haploop.tools.dissipate.swing.buzz import Buzz
+from haploop.tools.dissipate.swing.finder import BuzzFinder
 from helpers.data.recordings import outcome, write
 from helpers.scenes.least import KINDS
 

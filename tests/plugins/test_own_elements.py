@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
+import matplotlib.text
 import numpy as np
 import pytest
 
@@ -168,7 +169,7 @@ def test_the_figure_has_a_panel_for_each_unit_of_what_elements_show(tmp_path):
     panels = [ax for part in make_figure(RunData.from_directory(tmp_path)).subfigs for ax in part.axes]
     own_panels = [ax for ax in panels if "Own columns" in ax.get_title("left")]
     shown = {ax.get_ylabel(): ax.get_legend_handles_labels()[1] for ax in own_panels}
-    assert shown == {"speed (mm/s)": ["speed of brake"], "ticks": ["ticks of brake"]}
+    assert shown == {"speed (mm/s)": ["brake"], "ticks": ["brake"]}
     assert [ax.get_title("left") for ax in own_panels] == ["Own columns: speed", "Own columns: ticks"]
 
 
@@ -182,12 +183,30 @@ def test_an_element_has_one_name_and_one_colour_in_all_panels_also_where_another
     lines = {ax.get_title("left"): {each.get_label(): each.get_color() for each in ax.lines} for ax in panels}
     forces, speeds = lines["Force by part"], lines["Own columns: speed"]
     for name in ("brake", "brake-2"):
-        assert speeds[f"speed of {name}"] == forces[name]
+        assert speeds[name] == forces[name]
         assert lines["Energy taken out of the device (given to it below 0)"][name] == forces[name]
     [panel] = [ax for ax in panels if ax.get_title("left") == "Force by part"]
     legend = panel.get_legend()
     assert legend
     assert {"damping", "unidirectional-inertia", "brake", "brake-2"} <= {text.get_text() for text in legend.get_texts()}
+
+
+def test_no_legend_of_own_columns_reaches_over_its_title_however_many_elements_show_them(tmp_path):
+    swaps = [{"at": 0.05 * n, "swap": {"kind": "brake", "damping": 0.1 * n}, "element": 0} for n in range(1, 7)]
+    of = own([{"kind": "brake", "damping": 0.05}], event=swaps)
+    run_in_process(of, KINDS, out=tmp_path)
+    (tmp_path / "scene.toml").write_text(to_toml(of.as_dict()))
+    figure = make_figure(RunData.from_directory(tmp_path))
+    figure.draw_without_rendering()
+    panels = [ax for part in figure.subfigs for ax in part.axes if "Own columns" in ax.get_title("left")]
+    assert len(panels) == 2
+    for ax in panels:
+        legend, (title,) = (
+            ax.get_legend(),
+            [each for each in ax.findobj(matplotlib.text.Text) if "Own" in each.get_text()],
+        )
+        assert legend
+        assert not legend.get_window_extent().overlaps(title.get_window_extent())
 
 
 def test_what_it_shows_must_be_a_field_of_its_memory():

@@ -11,8 +11,8 @@ import numpy as np
 from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.command import Request, Selection, compute_outcome, make_scene_for_text
 from haploop.tools.dissipate.outcome import Outcome
-from haploop.tools.dissipate.samples import Floats, Samples
-from haploop.tools.dissipate.text_recording import Layout
+from haploop.tools.dissipate.recording.samples import Floats, Samples
+from haploop.tools.dissipate.recording.text_recording import Layout
 from helpers.scenes.least import KINDS
 
 PERIOD_S = 1e-3

@@ -168,7 +168,7 @@ def dissipate(
         RecordingError, FileNotFoundError, LogError, SceneError, ElementError: the recording or selection is wrong.
     """
     from haploop.tools.dissipate.command import Request, Selection, compute_outcome
-    from haploop.tools.dissipate.text_recording import Layout
+    from haploop.tools.dissipate.recording.text_recording import Layout
 
     dampings, masses = _texts(damping), _texts(mass)
     place = None if wall is None else str(plain(wall))

@@ -73,7 +73,7 @@ def dissipate(
     """
     from haploop.tools.dissipate.command import Request, Selection
     from haploop.tools.dissipate.command import dissipate as book
-    from haploop.tools.dissipate.text_recording import Layout
+    from haploop.tools.dissipate.recording.text_recording import Layout
 
     selection = Selection(damping or [], mass or [], element or [], wall, occupies, set or [])
     units = unit, time_unit, velocity_unit, acceleration_unit

@@ -1,5 +1,5 @@
 """``haploop dissipate``: the energy that dissipation elements would have taken out of a recorded motion.
 
-``text_recording`` and ``samples`` read a recording, ``booking`` puts elements to work on it, ``outcome`` holds
-the numbers, ``report`` and ``figure`` show them.
+``recording`` reads what was recorded, ``swing`` looks for a buzz in it, ``booking`` puts elements to work on it,
+``outcome`` holds the numbers, ``report`` and ``figure`` show them.
 """

@@ -17,7 +17,7 @@ from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.force_book import ForceBook, ForceRows
-from haploop.tools.dissipate.samples import Floats, Samples
+from haploop.tools.dissipate.recording.samples import Floats, Samples
 
 # Estimates begin at rest: the jump of the first samples is no noise.
 _FIRST = 4

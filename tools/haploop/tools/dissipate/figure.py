@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.tools.dissipate.outcome import Outcome
+from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.dissipate.report import buzz_sentence, conclusion, make_row, note_sentences, rows, uneven
-from haploop.tools.dissipate.samples import Floats
 from haploop.tools.figure import style
 from haploop.tools.render.units import prefix_for
 

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from haploop.tools.dissipate.samples import Floats, Samples
+from haploop.tools.dissipate.recording.samples import Floats, Samples
 
 Passivity = Literal["passive", "fed the buzz", "generated", "other sign", "unresolved", "begins loaded"]
 # The terms of a sum that cancel leave so much of them.

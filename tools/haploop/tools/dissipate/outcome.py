@@ -11,10 +11,11 @@ import numpy as np
 from haploop.controller.dissipation import Element, Quantity
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.dissipate.booking import Booked, Booking
-from haploop.tools.dissipate.buzz import Buzz, BuzzFinder, Overtone, Word
 from haploop.tools.dissipate.force_book import Passivity
-from haploop.tools.dissipate.samples import Floats, LogRecording
-from haploop.tools.dissipate.text_recording import TextRecording
+from haploop.tools.dissipate.recording.samples import Floats, LogRecording
+from haploop.tools.dissipate.recording.text_recording import TextRecording
+from haploop.tools.dissipate.swing.buzz import Buzz, Overtone, Word
+from haploop.tools.dissipate.swing.finder import BuzzFinder
 from haploop.tools.render.units import amount
 from haploop.view.look.spectrum import Line
 from haploop.view.store.lod_level import extremes

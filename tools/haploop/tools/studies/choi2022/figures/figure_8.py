@@ -9,7 +9,7 @@ import numpy as np
 from haploop.controller.dissipation import registry
 from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.booking import Booked, Booking
-from haploop.tools.dissipate.samples import Samples
+from haploop.tools.dissipate.recording.samples import Samples
 from haploop.tools.figure.style import dress, empty_figure, legend
 from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.device import FRICTION_N, KINDS, Setup, elements_of

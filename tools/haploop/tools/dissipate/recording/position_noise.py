@@ -7,7 +7,7 @@ from math import comb
 
 import numpy as np
 
-from haploop.tools.dissipate.samples import Samples
+from haploop.tools.dissipate.recording.samples import Samples
 
 # Of the eighth difference white noise makes a variance of binomial(16, 8) times its own; of a motion at a tenth of the
 # sampling rate it leaves 0.02 of the amplitude, of slower ones nothing.

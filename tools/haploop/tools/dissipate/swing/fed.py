@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from haploop.tools.dissipate.samples import Floats
+from haploop.tools.dissipate.recording.samples import Floats
 
 # A force gives to the swing, or takes, from so much on of what it would at most.
 LEAST_FED = 0.01

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from haploop.launch.scene.units import scale_of
-from haploop.tools.dissipate.delimited import Column, DelimitedFile
-from haploop.tools.dissipate.plausible import Largest
-from haploop.tools.dissipate.samples import Floats, Notes, RecordingError, Samples
-from haploop.tools.dissipate.stamps import ONE_MISSING, Stamps, is_late, stamps
+from haploop.tools.dissipate.recording.delimited import Column, DelimitedFile
+from haploop.tools.dissipate.recording.plausible import Largest
+from haploop.tools.dissipate.recording.samples import Floats, Notes, RecordingError, Samples
+from haploop.tools.dissipate.recording.stamps import ONE_MISSING, Stamps, is_late, stamps
 
 # Names of columns that are looked for where none is given.
 _TIMES = ("t", "time", "timestamp", "time_s", "t_s", "seconds")

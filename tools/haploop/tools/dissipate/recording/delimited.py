@@ -18,7 +18,7 @@ import numpy as np
 from haploop.launch.scene.units import is_number, name_and_unit
 from haploop.protocol.files import demand_regular
 from haploop.protocol.names import nearest
-from haploop.tools.dissipate.samples import Floats, RecordingError
+from haploop.tools.dissipate.recording.samples import Floats, RecordingError
 
 _BLOCK_ROWS = 16_384
 

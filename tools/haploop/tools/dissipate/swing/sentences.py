@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from haploop.tools.dissipate.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, Buzz, Word
-from haploop.tools.dissipate.fed import LEAST_FED
 from haploop.tools.dissipate.outcome import Outcome
+from haploop.tools.dissipate.swing.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, Buzz, Word
+from haploop.tools.dissipate.swing.fed import LEAST_FED
 from haploop.tools.render.units import amount
 
 _BUZZ: dict[Word, str] = {

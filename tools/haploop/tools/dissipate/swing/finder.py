@@ -1,19 +1,17 @@
-"""The buzz of a recording: a swing faster than a hand's, at one frequency, that lasts and is wide enough to be felt."""
+"""The search for a buzz in the windows of a recording."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from haploop.launch.stability.traces import is_felt
-from haploop.tools.dissipate.fed import LEAST_FED, fed_W
-from haploop.tools.dissipate.samples import Floats, Samples
+from haploop.tools.dissipate.recording.samples import Floats, Samples
+from haploop.tools.dissipate.swing.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, Buzz, Overtone, Word
+from haploop.tools.dissipate.swing.fed import fed_W
 from haploop.view.look.spectrum import Line, main_line
 
-# Slower swings are a hand's: voluntary ones end at some 8 Hz, tremor at 12 Hz.
-ABOVE_HZ = 15.0
 # The spectrum is that of windows so long, a quarter of it apart.
 _WINDOW_S, _HOPS = 0.5, 4
 _RESOLVED_HZ = 1.0 / _WINDOW_S
@@ -23,76 +21,18 @@ _SHARE = 0.8
 _COUNTS, _SMALLEST = 2.0, 10.0
 # It goes on to the end of a part whose last half second it swings through, this share of the window before as wide.
 _GOES_ON = 0.9
-# It lasts so long, and does not decay below this share meanwhile: what is struck rings shorter.
-LASTS_S, _KEPT = 1.0, 0.7
+# It does not decay below this share while it lasts: what is struck rings shorter.
+_KEPT = 0.7
 # Where its velocity jumps, as at a wall, a slower periodic motion has overtones, at multiples k of its frequency, of no
 # more than this over k^2 of its width. They meet the multiple to so many Hz; of the slowest they are too close.
 _OVERTONE, _APART_HZ, _CLOSE_HZ = 3.5, 0.3, 2.5
 # A gap of no more than this, after so many times as many samples without one, is bridged by a straight line: the swing
 # loses no more of its width than the gap is of a window.
 _BRIDGED_S, _BETWEEN = 0.01, 10
-# Samples a second below which noise has too few lines for one to stand out.
-LEAST_RATE_HZ = 200.0
 
 # The first window that a swing fills which began within the first, by number; one before it is left out where it is
 # less than ``_KEPT`` as wide. Of those left the first and the last may be empty for about a quarter; the third is full.
 _FULL, _THIRD = _HOPS - 1, 2
-
-Word = Literal["buzzes", "none seen", "cannot say"]
-
-
-@dataclass(frozen=True)
-class Buzz:
-    """The buzz of a recording, in one stretch or more.
-
-    Attributes:
-        frequency_Hz, within_Hz: median of the windows', and half of what a window resolves.
-        least_Hz, most_Hz: of the windows.
-        stretches: (from, to) of each, a fifth of a second at most too early or late, s.
-        width_m: of the widest window, peak to peak, of the sine at its frequency: to 1 % and a tenth of a count beside
-            a drift, to 3 % beside a hand's motion fifteen times as wide. Overtones may add some percent.
-        first_m, last_m: widths of the third window, which it fills, and of the last, or the last but two where it ends
-            before the recording does.
-        fed_W: mean power that a recorded force gave to the swing with its overtones, where it fills a window; negative
-            where it took; None where none was recorded.
-        moved_W: mean of what it would be were force and velocity in phase.
-    """
-
-    frequency_Hz: float
-    within_Hz: float
-    least_Hz: float
-    most_Hz: float
-    stretches: tuple[tuple[float, float], ...]
-    width_m: float
-    first_m: float
-    last_m: float
-    fed_W: float | None = None
-    moved_W: float = 0.0
-
-    @property
-    def lasts_s(self) -> float:
-        return sum(to_s - from_s for from_s, to_s in self.stretches)
-
-    @property
-    def fed_J(self) -> float | None:
-        """Returns what the force gave to the swing while it lasted; None where none was recorded."""
-        return None if self.fed_W is None else self.fed_W * self.lasts_s
-
-    @property
-    def is_fed(self) -> bool:
-        """Tells whether the force gave more to the swing than what may be rounding and noise."""
-        return self.fed_W is not None and self.fed_W > LEAST_FED * self.moved_W
-
-
-class Overtone(NamedTuple):
-    """A line that was left out, near a multiple of a slower one."""
-
-    line: Line
-    slower_Hz: float
-
-    @property
-    def order(self) -> int:
-        return round(self.line.frequency_Hz / self.slower_Hz)
 
 
 class _Window(NamedTuple):

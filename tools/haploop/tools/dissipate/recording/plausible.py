@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from haploop.tools.dissipate.samples import Floats
+from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.render.units import amount
 
 # Velocities are taken over so long, s: from sample to sample the counts of an encoder look faster than any hand.

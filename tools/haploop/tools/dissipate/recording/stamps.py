@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from haploop.tools.dissipate.samples import Floats
+from haploop.tools.dissipate.recording.samples import Floats
 
 # Digits behind the point that are looked for: stamps with more are taken as they are.
 _DIGITS = range(-6, 8)

@@ -1,0 +1,1 @@
+"""Recordings: text files and logs, their samples, units and time stamps."""

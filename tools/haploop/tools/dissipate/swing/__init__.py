@@ -1,0 +1,1 @@
+"""Swings of a recorded motion: whether it buzzes, and what feeds it."""
