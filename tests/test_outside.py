@@ -120,6 +120,7 @@ def test_without_the_package_its_table_is_no_key_of_a_scene(scene: Path) -> None
     assert 'wall.kind is "bumper"' in done.stderr
 
 
+@pytest.mark.slow
 def test_the_schema_for_editors_has_their_keys() -> None:
     schema = json.loads(outside("check", "--schema").stdout)
     assert "gravity" in schema["properties"]
@@ -197,6 +198,7 @@ def test_processes_find_them_too_and_have_the_same_bits(tmp_path: Path) -> None:
     assert one["energy"] == many["energy"]
 
 
+@pytest.mark.slow
 def test_the_integrator_is_of_order_4(scene: Path) -> None:
     """Half the step leaves a sixteenth of the error."""
     code = f"""

@@ -112,6 +112,7 @@ def test_above_what_friction_bridges_a_wall_chatters_and_below_it_rests():
     assert above.by_force
 
 
+@pytest.mark.slow
 def test_a_hold_of_the_task_alone_does_not_tell_a_wall_that_buzzes_at_another():
     loop = loop_of("omega3")
     with Trial(Store()) as trial:

@@ -69,6 +69,7 @@ def test_where_nothing_withstands_no_wall_is_advised():
     assert won_of({NOTHING: (1000.0, 1.0), DAMPING: (1600.0, 1.0)}).bound_N_m == 0.0
 
 
+@pytest.mark.slow
 @settings(max_examples=10)
 @given(borne=st.tuples(*[st.floats(10.0, 1e4)] * 3), share=st.tuples(*[st.floats(0.05, 1.0)] * 3))
 def test_no_element_makes_the_advised_wall_softer_than_it_is_without(borne, share):

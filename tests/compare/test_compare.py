@@ -137,6 +137,7 @@ def smooth() -> Scene:
     return replace(loop_of("touch"), friction=None, encoder=None, actuator=None)
 
 
+@pytest.mark.slow
 def test_a_wall_alone_renders_its_own_stiffness_and_a_coupling_that_of_two_springs_in_a_row(smooth: Scene):
     case = (Case(1.0, sway=0.0),)
     coupling = families.STABILIZERS[-1].elements((900.0, 1.0, 0.01))[0]

@@ -54,6 +54,7 @@ def test_swings_are_compared_where_positions_cannot_be(smooth):
     assert euler.doubt_m < 1e-3 * euler.amplitude_m
 
 
+@pytest.mark.slow
 def test_without_a_swing_there_is_no_frequency_to_be_off(smooth):
     seen = outcomes(smooth, ["exact"], [5_000], replace(exact_reference(smooth), pointwise=False))
     assert seen["exact", 5_000].error.frequency is None

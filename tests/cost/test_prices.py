@@ -69,6 +69,7 @@ def test_each_effect_stands_alone_but_for_what_it_is_read_through_with_its_own_v
     assert not effects_of(prices.alone(everything))
 
 
+@pytest.mark.slow
 def test_an_effect_alone_moves_the_led_device_by_little_of_its_way(jobs: prices.Jobs) -> None:
     """30 mm, in and out of the wall; what the controller only reads moves it not at all."""
     runs = {name: trajectory(job.scene).x_m for name, job in jobs["effects"].items()}

@@ -93,6 +93,7 @@ def test_error_bars_are_those_of_fewer_digits_and_another_method(name):
     assert "DOP853" in stored(name).how
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == "all_effects" else n for n in NAMES])
 def test_a_start_moved_by_a_tenth_of_a_micrometre_stays_as_near_unless_the_scene_is_chaotic(name):
     growth = growths(accuracy_scene(name), 10_000)

@@ -58,6 +58,7 @@ def no_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("haploop.tools.dissipate.command.make_figure", undrawn)
 
 
+@pytest.mark.slow
 def test_the_last_line_of_the_table_names_the_figure(recording: Path) -> None:
     result = dissipate(recording, "--damping", "2.7", "--mass", "0.0018")
     assert result.exit_code == 0, result.output

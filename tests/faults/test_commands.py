@@ -63,6 +63,7 @@ def test_every_command_takes_effect_at_its_tick_stands_in_the_log_and_the_run_re
     assert ask("replay", str(run.out)).status == 0
 
 
+@pytest.mark.slow
 def test_a_replay_says_so_when_the_log_is_not_what_ran(running):
     """Without the swap in its scene of events, the same run gives other bits."""
     run = running(sets=("duration=0.6", "wall.position=-0.001"), pace=())

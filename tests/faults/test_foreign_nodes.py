@@ -39,6 +39,7 @@ def test_a_foreign_controller_gives_the_bits_of_our_own_and_is_told_as_foreign(s
     assert theirs["verdict_rule"].startswith("By its window alone, since the controller was not haploop's own")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "words"),
     [

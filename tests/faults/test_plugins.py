@@ -200,6 +200,7 @@ def test_a_force_that_never_returns_in_one_process_is_ended_by_the_second_interr
     assert "Interrupted at once" in run.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("statement", "words"),
     first_and_slowly(
@@ -231,6 +232,7 @@ def test_an_element_that_refuses_its_parameters_is_an_error_of_the_scene_and_not
     assert not run.out.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("role", first_and_slowly(*ROLES))
 def test_a_node_whose_python_does_not_even_start_ends_the_run_and_is_named(role, running, tmp_path, monkeypatch):
     (tmp_path / "sitecustomize.py").write_text(

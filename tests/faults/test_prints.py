@@ -85,6 +85,7 @@ def test_all_that_is_printed_stands_in_a_file_of_the_run_marked_with_node_and_ti
     assert f"all of it stands in {run.out / 'prints.txt'}" in run.stderr
 
 
+@pytest.mark.slow
 def test_a_run_in_which_nothing_is_printed_has_no_such_file(running):
     run = running(sets=("duration=0.1",), pace=())
     run.summary()

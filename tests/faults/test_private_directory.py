@@ -223,6 +223,7 @@ for round in range(40):
 """
 
 
+@pytest.mark.slow
 def test_launchers_that_start_end_and_list_at_once_never_lose_a_directory(live_runs_here):
     crowd = [subprocess.Popen([sys.executable, "-c", RACE, str(n)], stderr=subprocess.PIPE) for n in range(6)]
     assert [one.communicate()[1].decode() for one in crowd] == [""] * 6

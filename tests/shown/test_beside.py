@@ -210,6 +210,7 @@ def test_below_an_overlay_the_notes_of_each_run_stand_with_its_name_and_shared_o
     assert max(map(len, lines)) < 200
 
 
+@pytest.mark.slow
 def test_each_overlay_has_a_file_of_its_own_in_the_first_directory(runs):
     for other in ("again", "bare"):
         assert haploop("plot", runs["a"], runs[other]).stdout.strip() == str(runs["a"] / f"with_{other}.png")

@@ -128,6 +128,7 @@ def test_the_figure_draws_all_bodies_and_forces_of_the_plant_and_counts_what_was
     assert not any(artists(none, name) for name in ("tip", "hand", "friction", "actuator", "saturation"))
 
 
+@pytest.mark.slow
 def test_every_force_stands_in_the_legend_and_no_legend_covers_a_title(poor):
     figure = make_figure(RunData.from_directory(poor[0]))
     figure.draw_without_rendering()

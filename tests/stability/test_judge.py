@@ -59,6 +59,7 @@ def test_friction_that_holds_the_device_is_rest():
     assert word(**pressed(friction={"kinetic": 0.3})) == "steady"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kinetic", "word", "blown"), [(0.043, "undecided", "swings on"), (0.17, "steady", "rests")])
 def test_a_loop_that_friction_stops_after_a_push_but_not_after_a_blow_is_not_called_steady(kinetic, word, blown):
     """A loop of rho(M) > 1 by its map: friction of 2 % of the hold stops what 0.3 of it set off, but not what 3 do."""

@@ -156,5 +156,6 @@ def test_without_verdicts_or_rows_or_matplotlib_there_is_no_map_and_a_reason(
         make_figure(data)
 
 
+@pytest.mark.slow
 def test_the_file_of_a_map_is_a_picture(data: MapData, tmp_path: Path) -> None:
     assert write_figure(make_figure(data), tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")

@@ -78,6 +78,7 @@ def test_what_a_steady_verdict_rests_on_is_told_with_the_answer_and_counted() ->
     assert "No run was pushed" not in told
 
 
+@pytest.mark.slow
 def test_a_map_of_cheap_verdicts_says_that_no_run_was_pushed(data: MapData) -> None:
     cheap = dataclasses.replace(data, sweep={**data.sweep, "base": {"title": "a base", "run": {"verdict": "window"}}})
     assert "No run was pushed: the words are what its last half second shows" in legend(make_figure(cheap))
@@ -119,6 +120,7 @@ def test_all_failed_says_so_and_marks_no_answer() -> None:
     assert "No wall is steady" in legend(drawn)
 
 
+@pytest.mark.slow
 def test_amplitudes_that_were_not_recorded_are_missed_aloud(data: MapData) -> None:
     columns = {name: column for name, column in data.columns.items() if name != AMPLITUDE}
     drawn = make_figure(dataclasses.replace(data, columns=columns))

@@ -74,7 +74,7 @@ def test_every_heat_and_work_of_every_step_is_its_integral_along_a_motion_made_a
         assert flows[name] == pytest.approx(expected, rel=0, abs=1e-12 * np.abs(expected).max()), name
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", [*[*CASES][::2], *slowly([*CASES][1::2])])
 def test_the_books_close_on_it_and_with_one_of_the_wrong_sign_they_do_not(case):
     flows, true = booked(case)
     assert unexplained(flows, true) < 1e-13

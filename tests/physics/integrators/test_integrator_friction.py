@@ -141,6 +141,7 @@ def test_all_effects_at_once_run_by_every_method_and_blocks_change_no_bit(method
     assert one["verdict"] in ("steady", "limit-cycle")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", first_and_slowly("rk4", "dop853"))
 def test_processes_give_the_bits_of_one_process(method, tmp_path):
     sets = [f"clock.integrator={method}", "duration=0.05"]

@@ -236,6 +236,7 @@ def test_noise_changes_neither_delays_nor_losses():
     assert np.array_equal(noisy.plant["command"], run(scene(**LONG, **LATE)).plant["command"])
 
 
+@pytest.mark.slow
 def test_blocks_of_any_size_give_the_same_summary_also_when_the_run_is_stopped_or_diverges():
     stopped = {"event": [{"at": 0.2003, "stop": True}]}
     diverging = {"device": {"mass": 0.01, "damping": 0.0, "velocity": -1.0}, "diverged_beyond": 0.02}

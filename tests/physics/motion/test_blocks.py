@@ -17,7 +17,7 @@ from helpers.scenes.random_scenes import drawn
 SCENES = sorted((Path(__file__).parents[3] / "launch/scenes").glob("*.toml"))
 
 
-@pytest.mark.parametrize("seed", [6, 11, *slowly([24, 25, 29])])
+@pytest.mark.parametrize("seed", [6, *slowly([11, 24, 25, 29])])
 def test_blocks_and_windows_of_any_size_give_the_same_summary_of_drawn_scenes(seed):
     scene, _ = drawn(seed)
     usual = in_blocks(scene, 100, 4)

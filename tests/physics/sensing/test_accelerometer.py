@@ -136,6 +136,7 @@ def test_an_accelerometer_no_estimate_reads_is_not_there():
     assert without == unread
 
 
+@pytest.mark.slow
 def test_clipped_ticks_are_the_same_for_blocks_of_any_size_also_when_the_run_is_stopped_or_diverges():
     stopped = {"event": [{"at": 0.1003, "stop": True}]}
     diverging = {"hand": {"force": {"kind": "ramp", "value": -3.0, "rise_time": 0.2}}, "diverged_beyond": 0.01}
