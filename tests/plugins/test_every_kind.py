@@ -200,6 +200,15 @@ def test_what_is_missing_or_raises_is_told_with_file_and_line(
         load(scene, plugins=[plugin])
 
 
+@pytest.mark.slow
+def test_what_does_not_come_to_an_end_is_told_with_file_and_line(tmp_path: Path) -> None:
+    scene, plugin = with_all(
+        tmp_path, ALL.replace("        d = self.thickness", "        while True:\n            d = 1")
+    )
+    with pytest.raises(PluginError, match=r"it did not come to an end within 2 s \(own.py, line \d+\)"):
+        load(scene, plugins=[plugin])
+
+
 def test_a_file_with_nothing_that_a_scene_can_name_says_what_was_expected(tmp_path: Path) -> None:
     scene, plugin = written(tmp_path, [], "class Brake: pass\n")
     with pytest.raises(PluginError, match="a class derived from Element, Wall, Estimator or HandForce was expected"):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -17,6 +20,8 @@ from haploop.protocol.ticks import Timebase
 from haploop.protocol.walls.registry import make_wall
 from haploop.protocol.walls.wall import Wall
 
+# So long may each be at work, where it can be interrupted: in the main thread.
+_LIMIT_S = 2.0
 _DEPTHS_M, _TIMES_S = (0.0, 1e-4), (0.0, 0.5, 3.0)
 
 
@@ -68,9 +73,29 @@ def _try_force(force: HandForce) -> None:
             )
 
 
+@contextmanager
+def _in_time() -> Iterator[None]:
+    """Raises TimeoutError in what goes on for longer than the limit."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(*_: object) -> None:
+        raise TimeoutError(f"it did not come to an end within {_LIMIT_S:g} s")
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, _LIMIT_S)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
 def _tried(what: str, do: str, call: Callable[[], Any]) -> Any:
     try:
-        value = call()
+        with _in_time():
+            value = call()
         is_fine = isinstance(value, Wall) or bool(np.isfinite(np.asarray(value, float)).all())
     except Exception as error:
         why = raised_in_file(error) or f"{type(error).__name__}: {error}"
