@@ -156,7 +156,7 @@ def test_a_loop_with_an_element_that_is_not_installed_has_no_limit_of_stiffness(
     assert scene
     assert LiveRuns().stiffness_limit(replace(scene, dissipation=()))
     unknown = replace(scene, dissipation=(replace(scene.dissipation[0], name="of a plugin"),))
-    assert LiveRuns().stiffness_limit(unknown) == "an element that is not known here"
+    assert LiveRuns().stiffness_limit(unknown) == "something of the scene is not known here"
 
 
 def test_what_cannot_be_read_is_refused_and_what_was_shown_stays(recorded, tmp_path):

@@ -106,7 +106,7 @@ class LiveRuns:
         except NeverStable:
             return "unstable with the softest wall"
         except (ElementError, ValueError, KeyError, ArithmeticError):
-            return "an element that is not known here"
+            return "something of the scene is not known here"
         return limit if math.isfinite(limit) else "stable with any wall"
 
     def has_launcher(self, run: LiveRun) -> bool:
