@@ -1,4 +1,4 @@
-"""Whether a recording buzzes: told of swings that last, at their frequency, and of nothing else."""
+"""The buzz of a recording: told of swings that last, at their frequency, and of nothing else."""
 
 from __future__ import annotations
 

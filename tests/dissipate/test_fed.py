@@ -1,4 +1,4 @@
-"""What a recorded force gives to a buzz, against closed forms, and the word passive beside it."""
+"""Energy that a recorded force gives to a buzz, against closed forms, and the word passive beside it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scene may name beside what comes with haploop: of installed packages, by entry points, and of plugin files."""
+"""Classes that a scene may name beside haploop's own: of installed packages, by entry points, and of plugin files."""
 
 from __future__ import annotations
 
@@ -30,10 +30,15 @@ def loaded(entry: EntryPoint) -> Any:
     try:
         return entry.load()
     except Exception as error:
-        raise PluginError(
-            f"An installed package names {entry.name!r} ({entry.value}) under {entry.group}, which does not load: "
-            f"{type(error).__name__}: {error}. Mend that package, or uninstall it."
-        ) from error
+        raise not_loaded(entry.name, entry.value, entry.group, error) from error
+
+
+def not_loaded(name: str, place: str, group: str, error: Exception) -> PluginError:
+    """Returns the error of an entry point that cannot be used; ``place`` is "module:object"."""
+    return PluginError(
+        f"An installed package names {name!r} ({place}) under {group}, which does not load: "
+        f"{type(error).__name__}: {error}. Mend that package, or uninstall it."
+    )
 
 
 def entry_points_of(group: str) -> EntryPoints:

@@ -9,7 +9,7 @@ from pathlib import Path
 from pkgutil import resolve_name
 
 from haploop.controller.dissipation.element import ASKABLE, Element
-from haploop.protocol.installed import Brought, entry_points_of
+from haploop.protocol.installed import Brought, entry_points_of, not_loaded
 from haploop.protocol.plugin_file import ELEMENTS, PluginError, bring_file, bring_source
 from haploop.protocol.quantity import Quantity
 
@@ -36,10 +36,7 @@ def registry(
         try:
             kinds[name] = checked(resolve_name(place), f"entry point {name} = {place}")
         except Exception as error:
-            raise PluginError(
-                f"An installed package names {name!r} ({place}) under {ELEMENTS}, which does not load: "
-                f"{type(error).__name__}: {error}. Mend that package, or uninstall it."
-            ) from error
+            raise not_loaded(name, place, ELEMENTS, error) from error
     for path in plugin_files or []:
         kinds.update(load_plugin(path))
     return kinds

@@ -22,7 +22,6 @@ ONE_MISSING = 2.5
 # Times scatter where of a hundred steps this many differ from the median by no less than this share of it.
 _OF_STEPS, _SCATTER = 80, 0.02
 
-
 Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
 

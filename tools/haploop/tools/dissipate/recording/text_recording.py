@@ -13,7 +13,7 @@ from haploop.launch.scene.units import scale_of
 from haploop.tools.dissipate.recording.delimited import Column, DelimitedFile
 from haploop.tools.dissipate.recording.plausible import Largest
 from haploop.tools.dissipate.recording.samples import Floats, Notes, RecordingError, Samples
-from haploop.tools.dissipate.recording.stamps import ONE_MISSING, Stamps, is_late, stamps
+from haploop.tools.dissipate.recording.stamps import ONE_MISSING, Flags, Stamps, is_late, stamps
 
 # Names of columns that are looked for where none is given.
 _TIMES = ("t", "time", "timestamp", "time_s", "t_s", "seconds")
@@ -27,8 +27,7 @@ _IN_SECONDS = ("time_s", "t_s", "seconds")
 _FAR_APART_S = 0.1
 # Positions without a unit are metres by these names.
 _IN_METRES = ("position_m", "x_m")
-# Periods above which there is a gap between two samples, and below which a single one is missing; deviation above which
-# a period is uneven.
+# Periods above which there is a gap between two samples; deviation above which a period is uneven.
 _GAP, _UNEVEN = 1.5, 0.1
 # Steps before and after a sample that repeats the one before, in counts: a device this fast does not stand still.
 _MOVING_COUNTS = 3.0
@@ -166,6 +165,11 @@ class TextRecording:
         """The longest step without a gap; rounding alone makes one as much longer as it rounds to."""
         return max(_GAP * self.period_s, self.period_s + self.notes.rounded_s * (1.0 + _UNEVEN))
 
+    def _lacks(self, steps: Floats) -> Flags:
+        """Tells of steps between samples whether one is missing within; on a rounded even grid none is late."""
+        longer = steps > self._longest_s
+        return longer if self.notes.rounded_s else longer & ~is_late(steps, self.period_s)
+
     @property
     def _uneven_s(self) -> float:
         return _UNEVEN * self.period_s + self.notes.rounded_s
@@ -180,7 +184,7 @@ class TextRecording:
             self._widen(columns["position"])
             steps = np.diff(t, prepend=t[:1] if last_s is None else last_s)
             self._refuse_disorder(t, steps, lines, last_s)
-            is_gap = (steps > self._longest_s) & ~is_late(steps, self.period_s)
+            is_gap = self._lacks(steps)
             is_gap[0] |= last_s is None
             self.notes.uneven += int((np.abs(steps[~is_gap] - self.period_s) > self._uneven_s).sum())
             for at in np.flatnonzero(is_gap):
@@ -236,8 +240,7 @@ class TextRecording:
     def _bridged(self, columns: dict[str, Floats], lines: Floats) -> tuple[dict[str, Floats], Floats]:
         """Returns the rows with the mean of both neighbours where a single one is missing between them."""
         steps = np.diff(columns["time"])
-        longer = (steps > self._longest_s) & (steps < ONE_MISSING * self.period_s)
-        at = np.flatnonzero(longer & ~is_late(steps, self.period_s)) + 1
+        at = np.flatnonzero(self._lacks(steps) & (steps < ONE_MISSING * self.period_s)) + 1
         self.notes.bridged += len(at)
         whole = {
             name: np.insert(column, at, column[at - 1] / 2.0 + column[at] / 2.0) for name, column in columns.items()
