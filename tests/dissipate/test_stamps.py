@@ -62,10 +62,10 @@ def test_a_missing_sample_and_a_gap_are_found_between_rounded_times(tmp_path: Pa
 
 
 def test_single_missing_samples_are_found_between_times_rounded_to_more_than_half_a_period(tmp_path: Path) -> None:
-    """At 600 Hz in whole ms steps are 1 or 2 ms, and one that spans a missing sample may be 3 ms beside one of 1 ms."""
+    """At 617 Hz in whole ms steps are 1 or 2 ms, and one that spans a missing sample may be 3 ms beside one of 1 ms."""
     kept = np.ones(1600, bool)
-    kept[100:1500:101] = False
-    t = np.arange(1600)[kept] / 600.0
+    kept[100:1500:11] = False
+    t = np.arange(1600)[kept] / 617.0
     found = outcome(write(tmp_path / "holes.csv", {"t (ms)": np.round(t * 1e3), "x (m)": motion(t)}), dampings=["2"])
     assert (found.recording.notes.uneven, found.recording.notes.gaps) == (0, 0)
     assert found.recording.notes.bridged == (~kept).sum()
