@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import compress
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -146,21 +145,9 @@ def own_columns(history: History) -> list[Part]:
     ]
 
 
-# What is planned of a history, and for which elements, wall and columns: the same for thousands of pictures.
-_PLANS: WeakKeyDictionary[History, tuple[tuple[object, ...], list[Planned]]] = WeakKeyDictionary()
-
-
-def _plan(history: History) -> list[Planned]:
-    made_for = history.at_work, len(history.opened), *(series.opened for series in history.all_series)
-    known = _PLANS.get(history)
-    if known is None or known[0] != made_for:
-        known = _PLANS[history] = made_for, [planned(history) for planned in (_position, _force, _energy)]
-    return known[1]
-
-
 def over_time(history: History, interval: Interval) -> list[Table | None]:
     """Returns position, force and energy."""
-    return [interval.table(*planned) for planned in _plan(history)]
+    return [interval.table(*planned(history)) for planned in (_position, _force, _energy)]
 
 
 def overview(history: History) -> Table | None:

@@ -35,7 +35,6 @@ class LodSeries:
     logarithm of the run's length alone.
 
     Attributes:
-        opened: number of columns that were ever added: ``names`` are the same as long as it is.
         first_tick: first tick that is known; None before anything is.
         end_tick: the tick before which every tick is known, or never will be.
         full_from_tick: the tick from which on rows are held in full.
@@ -44,7 +43,6 @@ class LodSeries:
     def __init__(self, rows_per_tick: int, recent_ticks: int, origin: int) -> None:
         self.rows_per_tick, self.origin = rows_per_tick, origin
         self.first_tick: int | None = None
-        self.opened = 0
         self._columns: dict[str, int] = {}
         self._found: dict[tuple[str, ...], tuple[list[int], np.ndarray]] = {}
         # By names and ticks of a bucket: the first tick of the last envelope, and those of its buckets that are full.
@@ -102,7 +100,6 @@ class LodSeries:
         """Adds a column; where there are too many, in place of the oldest that is not present any more."""
         self._found.clear()
         self._known.clear()
-        self.opened += 1
         if len(self._columns) < MOST_COLUMNS:
             self._columns[name] = len(self._columns)
             for level in self._levels:
