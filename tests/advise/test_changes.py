@@ -1,4 +1,4 @@
-"""What a change of the device is said to gain: the element tuned anew, or left out, in the corners that are hardest."""
+"""Gains that are told of a change of the device: the element tuned anew, or left out, in the corners that are hardest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was tried is kept: an interrupted advice goes on, and a damaged, full or unreadable store is told."""
+"""Trials are kept: an interrupted advice goes on, and a damaged, full or unreadable store is told."""
 
 import json
 import os

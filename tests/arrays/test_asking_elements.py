@@ -1,4 +1,4 @@
-"""What an element is told that asks, from an arithmetic of its own; its bits alone, in batches and compiled."""
+"""Answers to elements that ask, from an arithmetic of its own; its bits alone, in batches and compiled."""
 
 from __future__ import annotations
 

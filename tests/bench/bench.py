@@ -78,7 +78,7 @@ def _first_tick_s() -> float:
             "--set",
             "run.verdict=window",
         ]
-        # Where the environment forbids bytecode, as container images do, every process would compile all of haploop anew.
+        # Where the environment forbids bytecode, as container images do, every process would compile haploop anew.
         environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
         began = time.perf_counter()
         command += ["--out", f"{folder}/out"]

@@ -1,4 +1,4 @@
-"""What ``make bench COMPARE=FILE`` marks as slower."""
+"""Marks of ``make bench COMPARE=FILE`` at what is slower."""
 
 import json
 from pathlib import Path

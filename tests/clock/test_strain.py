@@ -1,4 +1,4 @@
-"""What a sentence says of a process that did not answer is what the system tells of it."""
+"""Sentences about a process that did not answer, against what the system tells of it."""
 
 import pytest
 

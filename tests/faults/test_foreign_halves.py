@@ -1,4 +1,4 @@
-"""What a run with a half of somebody else's is told as: its books, its word, and what can be repeated of it."""
+"""Runs with a half of somebody else's: their books, their word, and the part of them that can be repeated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a foreign controller's blocks show of the changes it was told of."""
+"""Blocks of a foreign controller, which show the changes that it was told of."""
 
 from __future__ import annotations
 

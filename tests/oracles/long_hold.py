@@ -1,4 +1,4 @@
-"""What becomes of loops in the long run: each is run, held still, pushed, and left alone for 40 s and more.
+"""Fate of loops in the long run: each is run, held still, pushed, and left alone for 40 s and more.
 
 Written by hand, with nothing of the code that is judged by it: all loops side by side in arrays, bodies by the matrix
 exponential in absolute coordinates, dry friction as an impulse that stops a body, noise of its own. Scenes are

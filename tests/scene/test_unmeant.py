@@ -1,4 +1,4 @@
-"""What is in order in a scene but cannot be meant: asked after in one line, and silent where it can be."""
+"""Scenes that are in order but cannot be meant: one line asks; of those that can be meant nothing is said."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""What a figure says in words, and what is drawn or said of a run of which only a part is left."""
+"""Words of a figure, and the figure of a run of which only a part is left."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said in the same breath as ``steady``: friction that holds, one hold of many, a force that ripples."""
+"""Provisos told in the same breath as ``steady``: friction that holds, one hold of many, a force that ripples."""
 
 from __future__ import annotations
 

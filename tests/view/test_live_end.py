@@ -1,4 +1,4 @@
-"""How the page of a real run tells its end: summary, verdict, failure, and the run that comes next."""
+"""End of a real run, as its page tells it: summary, verdict, failure, and the run that comes next."""
 
 import asyncio
 import os

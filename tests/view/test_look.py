@@ -1,4 +1,4 @@
-"""What the page says of a loop as it goes: no word before it can be told, none that the picture contradicts."""
+"""Words of the page about a loop as it goes: no word before it can be told, none that the picture contradicts."""
 
 from types import SimpleNamespace
 from typing import Any

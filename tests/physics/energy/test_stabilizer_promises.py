@@ -1,4 +1,4 @@
-"""What each stabilizer promises, on motions that nothing restrains and in closed form; and where a promise ends."""
+"""Promises of each stabilizer, on motions that nothing restrains and in closed form; and where a promise ends."""
 
 from __future__ import annotations
 
