@@ -1,4 +1,4 @@
-"""Gains that are told of a change of the device: the element tuned anew, or left out, in the corners that are hardest."""
+"""Gains told of a change of the device: the element tuned anew, or left out, in the corners that are hardest."""
 
 from __future__ import annotations
 

@@ -6,26 +6,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from haploop.launch.stability.traces import is_felt
 from haploop.tools.dissipate.recording.samples import Floats, Samples
 from haploop.tools.dissipate.swing.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, Buzz, Overtone, Word
 from haploop.tools.dissipate.swing.fed import fed_W
+from haploop.tools.dissipate.swing.lines import is_overtone, overtone_of, swing
 from haploop.view.look.spectrum import Line, main_line
 
 # The spectrum is that of windows so long, a quarter of it apart.
 _WINDOW_S, _HOPS = 0.5, 4
 _RESOLVED_HZ = 1.0 / _WINDOW_S
-# A swing at one frequency has so much of the variance of all that is faster than ``ABOVE_HZ``.
-_SHARE = 0.8
-# The staircase of an encoder swings by less than a count, here the step that nine of ten exceed.
-_COUNTS, _SMALLEST = 2.0, 10.0
+# So far from a multiple a line may be for an overtone where the frequency changes within the window.
+_BLURRED_HZ = 0.3 * _RESOLVED_HZ
 # It goes on to the end of a part whose last half second it swings through, this share of the window before as wide.
 _GOES_ON = 0.9
 # It does not decay below this share while it lasts: what is struck rings shorter.
 _KEPT = 0.7
-# Where its velocity jumps, as at a wall, a slower periodic motion has overtones, at multiples k of its frequency, of no
-# more than this over k^2 of its width. They meet the multiple to so many Hz; of the slowest they are too close.
-_OVERTONE, _APART_HZ, _CLOSE_HZ = 3.5, 0.3, 2.5
 # A gap of no more than this, after so many times as many samples without one, is bridged by a straight line: the swing
 # loses no more of its width than the gap is of a window.
 _BRIDGED_S, _BETWEEN = 0.01, 10
@@ -118,7 +113,7 @@ class BuzzFinder:
         inside_s = (to_s - from_s) / _HOPS
         rate_Hz = (len(t_s) - 1) / (to_s - from_s)
         line = swing(x_m, rate_Hz)
-        if line and (slower := _overtone_of(line, x_m, rate_Hz)):
+        if line and (slower := overtone_of(line, x_m, rate_Hz, _BLURRED_HZ)):
             self._left_out.append(Overtone(line, slower.frequency_Hz))
             line = None
         last = self._stretches[-1]
@@ -186,7 +181,7 @@ class BuzzFinder:
         kept = stretch[lasting[0] : lasting[-1] + needed + 1] if lasting else []
         if kept and self.slow:
             frequency_Hz = float(np.median([window.line.frequency_Hz for window in kept]))
-            if _is_overtone(frequency_Hz, max(window.line.width for window in kept), self.slow):
+            if is_overtone(frequency_Hz, max(window.line.width for window in kept), self.slow):
                 self._left_out += [Overtone(window.line, self.slow.frequency_Hz) for window in kept]
                 return []
         return _filled(kept)
@@ -201,12 +196,6 @@ class BuzzFinder:
         if self.buzz():
             return "buzzes"
         return "none seen" if self.longest_s >= LASTS_S - 1e-9 and self.rate_Hz >= LEAST_RATE_HZ else "cannot say"
-
-
-def _is_overtone(frequency_Hz: float, width_m: float, of: Line, apart_Hz: float = _APART_HZ) -> bool:
-    order = frequency_Hz / of.frequency_Hz
-    is_multiple = abs(order - round(order)) * of.frequency_Hz < apart_Hz or of.frequency_Hz < _CLOSE_HZ
-    return is_multiple and width_m < _OVERTONE / order**2 * of.width
 
 
 def _filled(stretch: list[_Window]) -> list[_Window]:
@@ -225,20 +214,3 @@ def _joined(spans: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]
         else:
             joined.append((from_s, to_s))
     return tuple(joined)
-
-
-def swing(x_m: Floats, rate_Hz: float) -> Line | None:
-    """Returns the swing of a window that is faster than a hand's, wider than the counts are, and felt."""
-    line = main_line(x_m, rate_Hz, ABOVE_HZ)
-    steps = np.abs(np.diff(x_m))
-    if line is None or line.share < _SHARE or not is_felt(line.width, line.frequency_Hz):
-        return None
-    return line if line.width > _COUNTS * np.percentile(steps[steps > 0.0], _SMALLEST) else None
-
-
-def _overtone_of(line: Line, x_m: Floats, rate_Hz: float) -> Line | None:
-    """Returns the slower line of a window of which another may be an overtone, also where its frequency changes."""
-    slower = main_line(x_m, rate_Hz)
-    if not slower or slower.frequency_Hz >= ABOVE_HZ:
-        return None
-    return slower if _is_overtone(line.frequency_Hz, line.width, slower, 0.3 * _RESOLVED_HZ) else None
