@@ -180,3 +180,12 @@ def test_the_help_of_run_is_all_that_a_process_of_it_writes() -> None:
     done = subprocess.run([sys.executable, "-m", "haploop.tools.cli", "run", "--help"], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("Usage:")
+
+
+def test_mistakes_are_told_as_json_too(tmp_path):
+    (tmp_path / "bad.toml").write_text("[wall]\nstifness = 3\n", encoding="utf-8")
+    told = haploop("check", str(tmp_path / "bad.toml"), "--json")
+    mistakes = json.loads(told.stdout)["mistakes"]
+    assert told.exit_code == 2
+    assert any("did you mean stiffness?" in mistake for mistake in mistakes)
+    assert all(mistake in told.stderr for mistake in mistakes)

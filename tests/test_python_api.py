@@ -250,3 +250,9 @@ def test_a_scene_that_logs_nothing_gives_its_summary_and_says_so_of_the_rest(sce
 def test_importing_the_package_imports_nothing_else() -> None:
     code = "import sys, haploop.launch; print({'numpy', 'pydantic', 'zmq', 'mcap', 'pint'} & set(sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
+
+
+def test_what_can_hardly_be_meant_is_told_of_a_scene_as_check_tells_it(scene: Scene) -> None:
+    [far] = scene.set({"wall.position": "-60 m"}).notes
+    assert far.startswith("The wall is at -60 m; a run ends as diverged beyond 1 m")
+    assert scene.notes == []

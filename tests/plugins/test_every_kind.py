@@ -25,8 +25,10 @@ from haploop.protocol.register import UnknownKind
 from haploop.protocol.scene.hand_force import HandForce
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.walls.registry import make_wall, wall_class
+from haploop.tools.cli.options import bring_files
 from haploop.tools.executor.pool import Pool
-from haploop.tools.figure.run_figure import draw
+from haploop.tools.figure.data import RunData
+from haploop.tools.figure.run_figure import draw, make_figure
 from helpers.runs.batches import together
 
 PAGE = (Path(__file__).parents[2] / "docs/plugins.md").read_text(encoding="utf-8")
@@ -160,6 +162,18 @@ def test_a_run_is_drawn_without_its_kinds_and_no_later_scene_may_name_them(tmp_p
     assert Scene.from_dict(scene.as_dict()).as_dict() == scene.as_dict()
     with pytest.raises(SceneError, match=r'wall.kind is "skin"\. .* A wall of yours comes with --plugin FILE\.'):
         load(tmp_path / "scene.toml")
+
+
+def test_the_ideal_wall_of_a_run_is_drawn_where_its_file_is_given_again(tmp_path: Path) -> None:
+    out = gone(tmp_path)
+
+    def is_drawn() -> bool:
+        figure = make_figure(RunData.from_directory(out))
+        return bool(figure.findobj(lambda artist: artist.get_gid() == "spring"))
+
+    before = is_drawn()
+    bring_files([tmp_path / "own.py"])
+    assert (before, is_drawn()) == (False, True)
 
 
 def test_a_kind_that_is_not_at_hand_is_told_in_a_sentence() -> None:

@@ -48,6 +48,14 @@ def test_a_directory_of_that_name_is_no_file_of_ones_own():
     assert load("fig6c") == load(bundled("scenes")["fig6c"])
 
 
+@pytest.mark.parametrize("nowhere", ["", ".", "..", "/"])
+@pytest.mark.parametrize("command", ["check", "explain", "sweep", "advise"])
+def test_a_directory_in_place_of_a_file_is_a_sentence_even_where_its_path_has_no_name(command, nowhere):
+    told = call(command, nowhere)
+    assert told.exit_code == 2
+    assert "This is a directory; a s" in told.output
+
+
 def test_a_scene_extends_what_comes_with_haploop_and_what_lies_beside_it_comes_first():
     folder = Path("deep", "devices")
     folder.mkdir(parents=True)

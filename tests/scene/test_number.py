@@ -42,7 +42,7 @@ def test_text_with_a_unit_is_the_same_float_as_the_si_number_to_the_last_bit(tex
         ("2 ms", "ms is a time, but N/m is a stiffness."),
         ("5 Ns/mm", '"Ns/mm" is not a unit; leave a space between multiplied units.'),
         ("5", 'Text must carry a unit, such as "5 N/m"'),
-        ("five N/m", "It must be a number and its unit"),
+        ("five N/m", 'It must be a number and its unit, such as "1 N/m" or "0.2 N/m / 4096".'),
         ("1e9999 N/m", '"e9999 N/m" is not a unit'),
         ("5 m**999999999", "It must be a number and its unit"),
         ("5 m**9**9**9", "It must be a number and its unit"),

@@ -15,6 +15,7 @@ import pytest
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.bundled import of_name
 from haploop.logger import read
+from haploop.tools.figure.command import draw_any
 from haploop.tools.figure.data import FigureError, RunData
 from haploop.tools.figure.run_figure import draw, event_lines, key_numbers, make_figure
 from haploop.tools.figure.scene_units import element_units
@@ -107,6 +108,14 @@ def test_the_loop_of_a_run_that_never_touches_its_wall_says_so_and_has_no_legend
     ax = next(ax for ax in figure.get_axes() if "Force against" in ax.get_title("left"))
     assert [text.get_text() for text in ax.texts] == ["The device does not touch the wall."]
     assert ax.get_legend() is None
+
+
+def test_dollars_in_names_and_titles_are_drawn_as_they_are_written(tmp_path: Path) -> None:
+    for name in ("$\\foo$", "stiff $x_1$"):
+        of = [f'title="{name}"'.replace("\\", "\\\\"), "duration=0.1", 'run.verdict="window"']
+        run(prepare(of_name("fig6c", "scenes") or Path(), of, out=tmp_path / name), in_process=True)
+    assert draw(tmp_path / "$\\foo$").read_bytes().startswith(PNG)
+    assert draw_any([tmp_path / "$\\foo$", tmp_path / "stiff $x_1$"]).read_bytes().startswith(PNG)
 
 
 def test_the_figure_of_a_run_that_failed_says_so_and_why(runs: dict[str, Path]) -> None:

@@ -167,8 +167,8 @@ class LiveLoop:
     def set(self, values: Mapping[str, Any], at: Any = None) -> int:
         """Changes numbers, ``{"wall.stiffness": "0.4 N/mm"}``, at once or at a simulated time; returns the tick.
 
-        The time is in s or text with its unit. What is in order then but may not be what was meant is told as a
-        ``UserWarning``, as ``haploop check`` does.
+        The time is in s or text with its unit. A number that hardly any loop has, as one in another unit than was
+        meant, is told as a ``UserWarning``.
 
         Raises:
             TypeError: the values are not given by key.

@@ -57,6 +57,13 @@ class LoadedScene:
         """All tables, copied: plain dicts, all numbers SI, defaults filled in, absent tables absent."""
         return self.scene.as_dict()
 
+    @property
+    def notes(self) -> list[str]:
+        """What is in order but may not be what was meant, a sentence each, as ``haploop check`` tells it."""
+        from haploop.launch.plan.effects import notes
+
+        return [str(note) for note in notes(self.scene, self.kinds)]
+
     def __getitem__(self, key: str) -> Any:
         value, path = self.tables, list[str]()
         for part in key.split("."):

@@ -39,7 +39,7 @@ def found(path: Path, folder: str, beside: Path = Path()) -> Path:
     Either may be named without its suffix.
     """
     own = beside / path
-    for file in (own, own.with_name(f"{own.name}.toml")):
+    for file in (own, own.with_name(f"{own.name}.toml")) if own.name else (own,):  # "." and "/" have none
         if os.path.exists(file) and not os.path.isdir(file):  # noqa: PTH110, PTH112 (false, not an error, for any name)
             return file
     return of_name(path.as_posix(), folder) or own

@@ -28,7 +28,8 @@ def from_text(text: str, target: str) -> Decimal:
     if not match and re.match(r"\s*[+-]?\d+,\d", text):
         raise ValueError(f'A decimal has a point and no comma: "{text.replace(",", ".", 1)}".')
     if not match:
-        raise ValueError(f'It must be a number and its unit, such as "1 {target or "%"}".')
+        quotient = f' or "0.2 {target} / 4096"' if target else ""
+        raise ValueError(f'It must be a number and its unit, such as "1 {target or "%"}"{quotient}.')
     amount, before, unit, after = match[1], Decimal(match[2] or 1), match[3] or "", Decimal(match[4] or 1)
     if not before * after:
         raise ValueError("A number cannot be divided by 0.")

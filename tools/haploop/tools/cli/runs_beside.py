@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from haploop.tools.cli.options import WRONG_USE, Directory, Json, leave, plain_errors, print_json
+from haploop.tools.cli.options import WRONG_USE, Directory, Json, Plugin, bring_files, leave, plain_errors, print_json
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -44,6 +44,7 @@ _COLUMNS = {
 def plot(
     directory: Annotated[list[Path], typer.Argument(help="directories of runs, or one of a sweep", show_default=False)],
     out: Annotated[Path | None, typer.Option(help="the figure's file [in the first directory]")] = None,
+    plugin: Plugin = None,
 ) -> None:
     """Draw a run, several over one another, or a sweep's map.
 
@@ -54,6 +55,7 @@ def plot(
     from haploop.tools.figure.data import FigureError
 
     with plain_errors():
+        bring_files(plugin or [])
         try:
             target = draw_any(directory, out)
         except FigureError as error:

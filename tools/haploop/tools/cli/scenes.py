@@ -54,6 +54,7 @@ def check(
     """Say what is wrong with a scene, or can hardly be meant."""
     from haploop.launch.plan.effects import notes
     from haploop.launch.scene.file import load
+    from haploop.launch.scene.mistakes import SceneError
     from haploop.launch.scene.schema import json_schema
     from haploop.launch.scene.toml_writer import to_toml
     from haploop.protocol.scene.scene import hand_is_unmodelled
@@ -65,7 +66,12 @@ def check(
             return
         if scene is None:
             raise typer.BadParameter("A scene file was expected, or --schema.")
-        resolved = load(scene, set or [], kinds, any_hand=True)
+        try:
+            resolved = load(scene, set or [], kinds, any_hand=True)
+        except SceneError as error:
+            if json:
+                print_json({"mistakes": [str(mistake) for mistake in error.mistakes]})
+            raise
     if json:
         print_json({**resolved.as_dict(), "notes": print_notes(resolved, kinds, scene, set or [])})
     else:

@@ -134,6 +134,7 @@ def write_figure(figure: Figure, target: Path) -> Path:
     if not target.suffix and not target.is_dir():
         target = target.with_name(f"{target.name}.png")
     picture, part = io.BytesIO(), target.with_name(f"{target.name}.part")
+    _take_as_written(figure)
     try:
         figure.savefig(picture, dpi=_DPI, format=target.suffix.removeprefix(".") or None)
         try:
@@ -150,14 +151,28 @@ def write_figure(figure: Figure, target: Path) -> Path:
     return target
 
 
+def _take_as_written(figure: Figure) -> None:
+    """Has names and titles of the user's drawn as they are written: their dollars enclose no formula."""
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        if "$" in text.get_text() and r"\mathdefault" not in text.get_text():  # powers of ten at an axis
+            text.set_parse_math(False)
+
+
 def fix_layout(figure: Figure) -> None:
     """Gives everything its place and keeps it there, so that labels can be placed among what is drawn."""
+    _take_as_written(figure)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
 
 
 def fit_text(text: Text, room_px: float, smallest: float = 0.78) -> None:
-    """Makes a text no wider than some pixels: smaller, down to a share of its size, then cut off."""
+    """Makes a text no wider than some pixels: smaller, down to a share of its size, then cut off.
+
+    A dollar in it encloses no formula.
+    """
+    text.set_parse_math(False)
     width, size = text.get_window_extent().width, float(text.get_fontsize())
     if width > room_px:
         # A little smaller than in proportion, since letters are as wide as whole pixels.
