@@ -63,6 +63,12 @@ def test_a_mistake_names_the_file_that_made_it(files, tmp_path):
     ]
 
 
+def test_a_table_given_twice_is_one_mistake_whatever_its_keys(files):
+    again = LEAST_TOML + "[wall]\nposition = 0.0\nstiffness = 1.0\n[wall]\nposition = 0.1\nstiffness = 2.0\n"
+    [mistake] = file_mistakes(files(twice=again))
+    assert "wall is given again, after line" in mistake
+
+
 def test_every_mistake_has_its_line_and_keys_given_twice_do_not_hide_the_others(files):
     path = files(
         top="""duration = 1.0

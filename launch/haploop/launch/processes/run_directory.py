@@ -137,7 +137,7 @@ def find(which: str | Elsewhere | None) -> LiveRun:
         raise RunNotFound("No run is live; start one with haploop run SCENE.")
     if not fitting:
         raise RunNotFound(f"No live run has the id or the name {run_id}; these are live:\n{listing}")
-    raise RunNotFound(f"{len(fitting)} runs are live; name one with --run ID:\n{listing}")
+    raise RunNotFound(f"{len(fitting)} runs are live; name one with --run ID, in Python attach(ID):\n{listing}")
 
 
 def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:

@@ -88,7 +88,10 @@ def _with_the_first(path: Path, text: str, doubled: list[Mistake]) -> Tables | N
     if found is None or not found.doubled:
         return None
     expected = "Leave one of the two out."
+    keys = {key for key, *_ in found.doubled}
     for key, first, again in found.doubled:
+        if any(key[:depth] in keys for depth in range(1, len(key))):  # the table that holds it is told already
+            continue
         given = f"is given again, after line {first}"
         doubled.append(Mistake(shown(path), ".".join(map(str, key)), given, expected, line=again))
     return found.data
