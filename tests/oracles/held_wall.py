@@ -128,13 +128,13 @@ def press(
         element -= np.where(now * a_before >= 0.0, elements.get("unidirectional-inertia", 0.0) * a, 0.0)
         command = np.where(count < 0, -stiffness * count * of.count + element, 0.0)
         counted, velocity, acceleration = count, now, a
-        commands.append(command)
+        commands.append(np.clip(command, -of.most_force, of.most_force))
         xs[tick], counts[tick], forces[tick] = at, count, command
+        hand = -holds * (1.0 + sway * np.sin(2.0 * np.pi * sway_Hz * tick * PERIOD_S))  # slow beside a tick
         for step in range(STEPS):
             k = tick * STEPS + step
             acting = (k - late) // STEPS
-            u = np.clip(commands[acting + 1] if acting >= 0 else commands[0], -of.most_force, of.most_force)
-            hand = -holds * (1.0 + sway * np.sin(2.0 * np.pi * sway_Hz * k * h))
+            u = commands[acting + 1] if acting >= 0 else commands[0]
             grip = of.grip_stiffness * (y - x) + of.grip_damping * (w - v)
             w = w + h * (hand - grip - of.hand_stiffness * y - of.hand_damping * w) / of.hand_mass
             if has_cable:
