@@ -6,7 +6,7 @@ from playwright.sync_api import expect
 from helpers.live.browser import DESK, IN_BOTH, PHONE, still
 from helpers.live.launched import first_and_slowly, wait_for
 from helpers.live.stand_in import ENDED, RUNNING, RUNS, SUMMARY
-from oracles.snapshots import contact
+from oracles.snapshots import contact, snapshot, table
 
 TABLET, LARGE = {"width": 820, "height": 1180}, {"width": 1920, "height": 1080}
 MAIN = ["#verdict", "#position", "#force", "#energy", "#pause", "[data-step='100']", "#stop", "#freeze", "#help"]
@@ -262,3 +262,48 @@ def test_on_a_phone_what_steers_is_in_sight_wherever_one_reads_and_the_swap_one_
     page.tap("#to-forms")
     expect(page.locator("#swap-do")).to_be_in_viewport()
     assert "token" in page.url
+
+
+# Every picture is drawn as if the page waited for a run, when charts have two columns, and shown as it was before.
+DRAWN_IN_ANOTHER_LAYOUT = """() => {
+    const ask = requestAnimationFrame;
+    window.requestAnimationFrame = act => ask(time => {
+        const before = document.body.dataset.phase;
+        document.body.dataset.phase = "waiting";
+        window.wideWhileDrawn = document.querySelector("#position .plot").clientWidth;
+        act(time);
+        document.body.dataset.phase = before;
+    });
+}"""
+# Left and right end of the card of each plot in sight, and of the plot.
+ENDS = """selector => [...document.querySelectorAll(selector)].filter(over => over.getClientRects().length)
+    .map(over => [over.closest(".chart"), over].map(e => e.getBoundingClientRect()))
+    .map(boxes => boxes.map(({left, right}) => [left, right]))"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("panel", ["loops", "spectrum", "own"])
+def test_a_chart_made_in_another_layout_than_it_is_shown_in_ends_where_its_card_does(panel, stand_in, open_page):
+    own = [table(f"own.{unit}", 0.0, 0.002, (f"0.{unit}", unit, unit, [1e-3] * 1000)) for unit in ("J", "N s/m")]
+    stand_in.state(own=True)
+    stand_in.show(contact())
+    page = open_page(stand_in.url, viewport=DESK)
+    expect(page.locator("#force .legend")).to_contain_text("total")
+    page.click(f"[data-panel={panel}]")
+    still(page)
+    page.evaluate(DRAWN_IN_ANOTHER_LAYOUT)
+    t = [i / 1000 for i in range(2000)]
+    others = [
+        table(name, 0.0, 1e-3, ("other", unit, "other", t))
+        for name, unit in (("position", "m"), ("force", "N"), ("energy", "J"))
+    ]
+    stand_in.show(snapshot(0.0, 2.0, *others, *own))
+    stand_in.drawn()
+    expect(page.locator("#energy .legend")).to_contain_text("other")
+    still(page)
+    assert page.evaluate("wideWhileDrawn - document.querySelector('#position .plot').clientWidth") > 200
+    found = page.evaluate(ENDS, ".charts .u-over")
+    assert len(found) == 3
+    assert len({tuple(over) for _, over in found}) == 1, "one time axis"
+    for card, over in [*found, *page.evaluate(ENDS, ".beside .u-over")]:
+        assert card[1] - 40 < over[1] < card[1]

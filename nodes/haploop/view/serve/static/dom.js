@@ -53,6 +53,20 @@ export function onSight(element, turned) {
   new IntersectionObserver((entries) => turned(entries.at(-1).isIntersecting), { rootMargin: "200px" }).observe(element);
 }
 
+/**
+ * The size of a box in whole pixels, as the browser last told it, and `turned` after each time that it was told. Nothing else
+ * measures the box: what was measured between two layouts would stay when the box is again as it was told.
+ */
+export function boxOf(element, turned) {
+  const box = { width: 0, height: 0 };
+  new ResizeObserver(([{ contentRect: { width, height } }]) => {
+    if (!width) return; // out of sight: it keeps its size
+    Object.assign(box, { width: Math.floor(width), height: Math.floor(height) });
+    turned();
+  }).observe(element);
+  return box;
+}
+
 /** Keeps the pixels of a canvas those of its box; `again` after they have changed. No frame asks for the layout. */
 export function fitCanvas(canvas, height_px, again) {
   new ResizeObserver(([{ contentRect }]) => {

@@ -1,7 +1,7 @@
 // A loop: one quantity against another, as in Figs. 3 and 4 of Choi et al. 2022.
 
 import { bottomAxis, leftAxis } from "./axes.js";
-import { make, onSight, put } from "./dom.js";
+import { boxOf, make, onSight, put } from "./dom.js";
 import { Legend, stroke } from "./legend.js";
 import { extent, Range } from "./range.js";
 
@@ -19,6 +19,7 @@ export class PhaseChart {
     this.ranges = least.map((smallest) => new Range(smallest));
     this.legend = new Legend(host, () => this.build());
     this.plot = host.appendChild(make("div", { class: "plot" }));
+    this.box = boxOf(this.plot, () => this.resize());
     this.absent = host.appendChild(make("p", { class: "absent" }, "Nothing yet."));
     this.parts = [];
     this.plot.hidden = true;
@@ -28,7 +29,6 @@ export class PhaseChart {
       this.isSeen = isSeen;
       this.draw();
     });
-    new ResizeObserver(() => this.resize()).observe(this.plot);
   }
 
   build() {
@@ -96,11 +96,11 @@ export class PhaseChart {
   }
 
   size() {
-    return { width: Math.max(120, this.plot.clientWidth), height: Math.max(80, this.plot.clientHeight) };
+    return { width: Math.max(120, this.box.width), height: Math.max(80, this.box.height) };
   }
 
   resize() {
     const size = this.size();
-    if (!this.plot.hidden && (size.width !== this.u.width || size.height !== this.u.height)) this.u.setSize(size);
+    if (size.width !== this.u.width || size.height !== this.u.height) this.u.setSize(size);
   }
 }

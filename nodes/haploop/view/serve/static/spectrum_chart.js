@@ -3,7 +3,7 @@
 import { amount, axisNumbers, named } from "./amounts.js";
 import { bottomAxis, leftAxis } from "./axes.js";
 import { ClimbingUnit } from "./climbing.js";
-import { make, put, seldom } from "./dom.js";
+import { boxOf, make, put, seldom } from "./dom.js";
 import { colour } from "./palette.js";
 import { line as linePath } from "./paths.js";
 import { Range, extent } from "./range.js";
@@ -31,7 +31,8 @@ export class SpectrumChart {
   chart(name, side, plot, said) {
     const unit = new ClimbingUnit(side.unit, side.prefix);
     const range = new Range(side.least * unit.factor);
-    const size = () => ({ width: Math.max(120, plot.clientWidth), height: Math.max(80, plot.clientHeight) });
+    const box = boxOf(plot, () => u.setSize(size()));
+    const size = () => ({ width: Math.max(120, box.width), height: Math.max(80, box.height) });
     const u = new uPlot(
       {
         ...size(),
@@ -51,7 +52,6 @@ export class SpectrumChart {
       [[1, 2], [0, 0]],
       plot,
     );
-    new ResizeObserver(() => plot.clientWidth && u.setSize(size())).observe(plot);
     return { name, side, unit, u, range, said };
   }
 

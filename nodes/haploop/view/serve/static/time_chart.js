@@ -2,7 +2,7 @@
 
 import { amount, named, steady } from "./amounts.js";
 import { bareAxis, bottomAxis, leftAxis } from "./axes.js";
-import { make, onSight, seldom } from "./dom.js";
+import { boxOf, make, onSight, seldom } from "./dom.js";
 import { Legend, stroke } from "./legend.js";
 import { drawMarks, drawMeasured, nameMarks } from "./marks.js";
 import { ClimbingUnit } from "./climbing.js";
@@ -34,6 +34,7 @@ export class TimeChart {
     this.range = new Range(options.least * this.unit.factor);
     this.legend = new Legend(host, () => this.retoggle());
     this.plot = host.appendChild(make("div", { class: "plot" }));
+    this.box = boxOf(this.plot, () => this.resize());
     this.lines = [];
     this.rough = [];
     this.names = [];
@@ -53,7 +54,6 @@ export class TimeChart {
       this.isSeen = isSeen;
       this.draw();
     });
-    new ResizeObserver(() => this.resize()).observe(this.plot);
     this.turn = () => this.build();
     NARROW.addEventListener("change", this.turn);
   }
@@ -230,7 +230,7 @@ export class TimeChart {
   }
 
   size() {
-    return { width: Math.max(120, this.plot.clientWidth), height: Math.max(60, this.plot.clientHeight) };
+    return { width: Math.max(120, this.box.width), height: Math.max(60, this.box.height) };
   }
 
   /** What stands along the left axis: the unit alone where the chart is too low for more. */
