@@ -84,6 +84,29 @@ def test_own_columns_with_long_names_are_told_in_full(viewport, stand_in, page):
     assert page.locator("#own .u-over").bounding_box()["height"] > 80
 
 
+# What stands along the left axis of a chart of one column after each of these, and how far from 0 the axis goes.
+AXES = """async columns => {
+    const { TimeChart } = await import("/static/time_chart.js");
+    const host = document.body.appendChild(document.createElement("section"));
+    const options = { label: "", unit: "N s/m", prefix: "", least: 1e-9, zero: false, times: true };
+    const chart = new TimeChart(host, options, { measured: [] });
+    const line = { key: "own", label: "own", line: { colour: "ink", width: 1 } };
+    return columns.map(column => {
+        const values = Float64Array.from(column);
+        chart.show([0, 1], values.map((_, i) => i / 10), [{ ...line, values }]);
+        return [chart.u.axes[1].label, chart.range.now[1]];
+    });
+}"""
+
+
+@pytest.mark.slow
+def test_a_column_that_is_zero_has_its_plain_unit_and_one_that_is_small_a_prefix(page):
+    zero, small = [0.0] * 5, [0.0, 2e-9, 4e-9, 2e-9, 0.0]
+    (plain, to), (prefixed, _), (still, _) = page.evaluate(AXES, [zero, small, zero])
+    assert (plain, prefixed, still) == ("N s/m", "nN s/m", "nN s/m")
+    assert to == pytest.approx(0.57), "0 and as much beyond it as there is beside all numbers"
+
+
 @pytest.mark.slow
 def test_an_element_has_the_same_colour_in_force_energy_and_momentum(stand_in, page):
     stand_in.show(contact())

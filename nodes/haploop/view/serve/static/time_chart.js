@@ -17,6 +17,8 @@ const CURSORS = "haploop";
 const NARROW = matchMedia("(max-width: 699px)");
 // What the times below take of a chart's height, and a letter beside it.
 const [TIMES_PX, LETTER_PX] = [46, 6.2];
+// No size is known yet that the axis could take: it has one of its unit.
+const WHERE_ALL_IS_ZERO = [-0.5, 0.5];
 const OVERLAY = { key: "overlay", line: { colour: "overlay", width: 1.2 } };
 // From so many pixels on, an interval of which only the extremes are kept is a box: a line would swing as nothing did.
 const BOX_PX = 4;
@@ -141,7 +143,8 @@ export class TimeChart {
   /** Whether other numbers want another unit. */
   climb(lines) {
     const [low, high] = extent(lines.map(({ values }) => values));
-    const climbs = this.unit.serve(Math.max(Math.abs(low), Math.abs(high), this.options.least));
+    const largest = Math.max(Math.abs(low), Math.abs(high));
+    const climbs = largest > 0 && this.unit.serve(Math.max(largest, this.options.least));
     if (climbs) Object.assign(this, { range: new Range(this.options.least * this.unit.factor) });
     return climbs;
   }
@@ -149,7 +152,8 @@ export class TimeChart {
   rerange() {
     const shown = this.columns.filter((_, i) => this.legend.isShown(this.lines[i].key));
     if (this.overlay?.fits && this.legend.isShown(OVERLAY.key)) shown.push(scaled(this.overlay.table.columns[0].values, this.unit.factor));
-    this.range.follow(...extent(shown, this.options.zero && shown.length ? [0] : []));
+    const [low, high] = extent(shown, this.options.zero && shown.length ? [0] : []);
+    this.range.follow(...(low === 0 && high === 0 ? WHERE_ALL_IS_ZERO : [low, high]));
   }
 
   draw(isWanted = this.isSeen) {
