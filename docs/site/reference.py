@@ -171,7 +171,8 @@ def summary() -> str:
         "The values are those of a run of `all_effects`, 0.6 s long, with a swap. A number that the run did not "
         "come to is `null`. Books are positive where energy was taken out of the device."
     )
-    return "\n\n".join(["# Summary", GENERATED, about, markdown_table(("key", "unit", "for example"), rows)]) + "\n"
+    table = markdown_table(("key", "unit", "for example"), rows)
+    return "\n\n".join(["# Summary", GENERATED, about, '<div class="keys entries" markdown>', table, "</div>"]) + "\n"
 
 
 def _leaves(entry: Any, key: str = "") -> Iterator[tuple[str, Any]]:
