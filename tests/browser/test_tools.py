@@ -152,20 +152,56 @@ def test_another_live_run_is_told_and_any_run_can_be_opened_or_drawn_over(stand_
     expect(page.locator("#runs")).to_be_hidden()
     stand_in.tell(RUNS)
     expect(page.locator("#how-many")).to_have_text("1 other run is live")
-    names = ["one (abc123)", "two (def456)", "first wall, steady, 1 Jan 12:00 (wall-1)"]
+    names = ["abc123: one", "def456: two", "wall-1: first wall, steady, 1 Jan 12:00"]
     expect(page.locator("#run option")).to_have_text(names)
     assert order(stand_in, page, lambda: page.click("#open-other")) == ("open", {"run": "def456"})
     assert page.input_value("#run") == "abc123"
     opened = order(stand_in, page, lambda: page.select_option("#run", "def456"))
     assert opened == ("open", {"run": "def456"})
     stand_in.tell({**RUNS, "shown": "fed987"})
-    expect(page.locator("#run option").last).to_have_text("one, ended (fed987)")
+    expect(page.locator("#run option").last).to_have_text("fed987: one, ended")
     assert page.input_value("#run") == "fed987", "what has ended is on show still"
     over = order(stand_in, page, lambda: page.select_option("#overlay", "wall-1"))
     assert over == ("overlay", {"run": "wall-1"})
     expect(page.locator("#behind")).to_be_hidden()
     stand_in.tell({**RUNS, "overlay": "wall-1"})
     expect(page.locator("#behind")).to_have_text("over: first wall: steady, 1 Jan 12:00")
+
+
+def test_a_run_drawn_over_one_that_went_on_longer_says_that_it_had_ended_before_what_is_shown(stand_in, page):
+    stand_in.tell({**RUNS, "overlay": "wall-1", "overlay_end_s": 2.0})
+    for (begin, end), words in (
+        ((15.0, 17.0), "It ended at 2 s, before what is shown"),
+        ((0.0, 17.0), ""),
+        ((1.5, 3.5), ""),
+    ):
+        stand_in.state(tick=round(1000 * end), end_tick=30_000)
+        stand_in.show(contact(begin, end))
+        expect(page.locator("#unseen")).to_contain_text(words) if words else expect(
+            page.locator("#unseen")
+        ).to_be_empty()
+
+
+def test_runs_of_one_scene_are_told_apart_where_their_names_are_cut_off(stand_in, page):
+    past = [{"id": f"demo-20261127-04575{i}", "title": "a long title", "told": "steady"} for i in (6, 9)]
+    stand_in.tell({**RUNS, "past": past, "overlay": past[1]["id"]})
+    expect(page.locator("#overlay option").nth(1)).to_have_text("…045756 demo: a long title, steady")
+    expect(page.locator("#overlay")).to_have_attribute("title", "demo-20261127-045759: a long title, steady")
+    room = "s => { const c = document.createElement('canvas').getContext('2d'); c.font = getComputedStyle(s).font;"
+    room += " return s.clientWidth - 48 - c.measureText('…045759…').width; }"
+    assert page.locator("#overlay").evaluate(room) > 0
+
+
+def test_a_page_that_only_watches_cannot_choose_a_run_and_says_why(stand_in, open_page):
+    stand_in.state()
+    stand_in.tell(RUNS)
+    choices = ("#run", "#overlay", "#open-other")
+    for url, may in ((stand_in.origin, False), (stand_in.url, True)):
+        page = open_page(url)
+        expect(page.locator("#how-many")).to_have_text("1 other run is live")
+        for choice in choices:
+            expect(page.locator(choice)).to_be_enabled(enabled=may)
+            assert ("Watching only" in page.get_attribute(choice, "title")) != may, choice
 
 
 def test_a_page_without_a_run_offers_nothing_to_save_and_its_charts_take_the_room(stand_in, page):

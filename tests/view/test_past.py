@@ -10,6 +10,7 @@ import pytest
 
 from haploop.launch import load, run
 from haploop.launch.runs.run_files import recorded_scene
+from haploop.protocol.scene.scene import ElementTable, Wall
 from haploop.tools.cli.live_runs import LiveRuns
 from haploop.view.draw.messages import event_lines, state
 from haploop.view.draw.snapshot import Viewport, snapshot
@@ -52,9 +53,11 @@ def test_a_viewer_shows_one_recorded_run_and_draws_another_over_it(recorded):
         viewer = Viewer(LiveRuns(), None, from_start=True)
         assert [past["id"] for past in viewer.listing()["past"]] == ["second", "first"]
         await viewer.open("second")
-        await viewer.lay_over("first")
+        assert viewer.listing()["overlay_end_s"] is None
+        assert await viewer.lay_over("first") == "Run first is drawn behind, to its end at 1.5 s."
         assert (viewer.listing()["shown"], viewer.listing()["overlay"]) == ("second", "first")
         assert viewer.listing()["overlay_diverged"] is False
+        assert viewer.listing()["overlay_end_s"] == 1.5
         assert viewer.overlay
         viewer.overlay.summary = {**(viewer.overlay.summary or {}), "verdict": "diverged"}
         assert viewer.listing()["overlay_diverged"] is True
@@ -156,7 +159,15 @@ def test_a_loop_with_an_element_that_is_not_installed_has_no_limit_of_stiffness(
     assert scene
     assert LiveRuns().stiffness_limit(replace(scene, dissipation=()))
     unknown = replace(scene, dissipation=(replace(scene.dissipation[0], name="of a plugin"),))
-    assert LiveRuns().stiffness_limit(unknown) == "something of the scene is not known here"
+    missing = "which reads no plugin files"
+    assert LiveRuns().stiffness_limit(unknown) == f"the element of a plugin is not known to this page, {missing}"
+    named = replace(scene, dissipation=(), wall=Wall(kind="skin", position=0.0, stiffness=100.0))
+    assert LiveRuns().stiffness_limit(named) == f'no wall of the kind "skin" is known to this page, {missing}'
+
+
+def test_what_makes_a_loop_nonlinear_is_told_beside_an_element_that_is_not_installed():
+    scene = replace(load("demo").scene, dissipation=(ElementTable(name="of a plugin"),))
+    assert LiveRuns().stiffness_limit(scene) == "not linear, by [friction]"
 
 
 def test_what_cannot_be_read_is_refused_and_what_was_shown_stays(recorded, tmp_path):

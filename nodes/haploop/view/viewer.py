@@ -103,8 +103,8 @@ class Viewer:
     def listing(self) -> Message:
         """Returns the live runs, the recorded ones, and which are on show, looked for now and then.
 
-        ``overlay_diverged`` tells of the one drawn behind whether its numbers left every bound, ``stays`` whether the
-        page keeps its run when that has ended.
+        ``overlay_diverged`` tells of the one drawn behind whether its numbers left every bound, ``overlay_end_s`` when
+        it ended, ``stays`` whether the page keeps its run when that has ended.
         """
         if wall_clock.monotonic() - self._listed[0] > _LIST_S:
             live, self._past = self._runs.live(), self._runs.past()
@@ -120,6 +120,7 @@ class Viewer:
             "stays": self._stays,
             "overlay": self.overlay and self.overlay.run.id,
             "overlay_diverged": bool(behind) and behind["verdict"] == "diverged",
+            "overlay_end_s": self.overlay and self.overlay.end_s,
         }
         return {"type": "runs", **self._listed[1], **shown}
 
@@ -141,8 +142,12 @@ class Viewer:
 
     async def lay_over(self, run_id: str) -> str:
         """Draws a recorded run behind the one on show, none for ""; raises CommandFailed as ``open`` does."""
-        self.overlay = await self._read(run_id) if run_id else None
-        return f"Run {run_id} is drawn behind." if run_id else "No other run is drawn behind."
+        self.overlay = behind = await self._read(run_id) if run_id else None
+        return (
+            f"Run {run_id} is drawn behind, to its end at {behind.end_s:g} s."
+            if behind
+            else "No other run is drawn behind."
+        )
 
     async def _read(self, run_id: str) -> RunSession:
         run = next((run for run in self._runs.past() if run.id == run_id), None)

@@ -120,7 +120,7 @@ def state(session: RunSession) -> Message:
         "run": session.run.id,
         "title": session.scene.title,
         "out": str(session.out),
-        "tick": history.end_tick if history.stop_tick is None else history.stop_tick,
+        "tick": session.end_tick,
         "end_tick": time.ticks,
         "control_rate": time.control_rate,
         "plant_rate": time.plant_rate,

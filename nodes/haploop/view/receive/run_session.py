@@ -104,6 +104,16 @@ class RunSession:
         return sum(self._observer.skipped.values())
 
     @property
+    def end_s(self) -> float:
+        """Returns the simulated time up to which the run went, or is known, s."""
+        return self.end_tick / self.time.control_rate
+
+    @property
+    def end_tick(self) -> int:
+        """Returns the tick up to which the run went, or is known."""
+        return self.history.end_tick if self.history.stop_tick is None else self.history.stop_tick
+
+    @property
     def real_time_factor(self) -> float | None:
         """Returns simulated over wall time, taken over the last second; None when nothing moves."""
         if len(self._seen) < 2:

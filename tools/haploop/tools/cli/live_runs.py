@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -94,19 +94,30 @@ class LiveRuns:
         return [self._recorded[file, ended_s] for ended_s, file in found[:_MOST_PAST]]
 
     def stiffness_limit(self, scene: Scene) -> float | str:
-        """Returns the largest stiffness with which the linear map of a loop is stable, N/m, or why there is none."""
+        """Returns the largest stiffness with which the linear map of a loop is stable, N/m, or why there is none.
+
+        Plugin files are not read: they are code, and that of a run is at work in the run alone.
+        """
         from haploop.controller.dissipation.element import ElementError
-        from haploop.tools.linear.linearity import why_not_linear
+        from haploop.protocol.register import UnknownKind
+        from haploop.tools.linear.linearity import installed_kinds, why_not_linear
         from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 
+        known = [table for table in scene.dissipation if table.name in installed_kinds()]
+        strange = [table.name for table in scene.dissipation if table not in known]
         try:
-            if curved := why_not_linear(scene):
+            if curved := why_not_linear(replace(scene, dissipation=tuple(known))):
                 return f"not linear, by {' and '.join(curved)}"
+            if strange:
+                return f"the element {' and '.join(strange)} is not known to this page, which reads no plugin files"
             limit = OneTickMap.from_scene(scene).stiffness_limit()
         except NeverStable:
             return "unstable with the softest wall"
-        except (ElementError, ValueError, KeyError, ArithmeticError):
-            return "something of the scene is not known here"
+        except UnknownKind as error:
+            missing = str(error).partition(" here.")[0].removeprefix("There is ")
+            return f"{missing} is known to this page, which reads no plugin files"
+        except (ElementError, KeyError, ValueError, ArithmeticError) as error:
+            return f"it cannot be computed: {error}"
         return limit if math.isfinite(limit) else "stable with any wall"
 
     def has_launcher(self, run: LiveRun) -> bool:

@@ -46,7 +46,7 @@ const time = new TimeControls(steering);
 const view = new ViewControls(viewport);
 const swapForm = new SwapForm(steering);
 const setForm = new SetForm(steering);
-const runs = new RunChoice(steering);
+const runs = new RunChoice(steering, viewport);
 const scrubber = new Scrubber(viewport);
 const sound = new Sound(viewport);
 byId("save-picture").addEventListener("click", () => {
@@ -98,6 +98,7 @@ function showState() {
     setForm.update(state.options, state);
   }
   allow(phase(), state.why, runs.listing?.stays);
+  runs.mark();
   if (snapshot) scrubber.show(snapshot, marks); // the last tick comes after the last picture
   view.update(!["running", "paused"].includes(phase()));
 }
@@ -136,6 +137,7 @@ function draw() {
 function redraw() {
   if (!snapshot) return;
   charts.show(snapshot, state, marks, runs.behind());
+  runs.tellUnseen();
   scrubber.show(snapshot, marks);
   sound.play(snapshot, state);
 }

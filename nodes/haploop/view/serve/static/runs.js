@@ -1,11 +1,20 @@
 // The runs there are: live ones and those that were recorded. One is on show, another may be drawn behind it.
 
+import { plain } from "./amounts.js";
 import { byId, make, put } from "./dom.js";
+import { maySteer } from "./stream.js";
+
+const WATCHING = "Watching only: who has the link that haploop view printed chooses the run, for all pages.";
 
 export class RunChoice {
-  /** @param {import("./steering.js").Steering} steering carries the choice: it is that of all pages of this viewer. */
-  constructor(steering) {
+  /**
+   * @param {import("./steering.js").Steering} steering carries the choice: it is that of all pages of this viewer.
+   * @param {import("./viewport.js").Viewport} viewport what is looked at.
+   */
+  constructor(steering, viewport) {
+    this.viewport = viewport;
     this.known = "";
+    this.words = new Map();
     byId("run").addEventListener("change", () => this.choose(steering, "open", byId("run")));
     byId("open-other").addEventListener("click", () => this.choose(steering, "open", byId("open-other")));
     byId("overlay").addEventListener("change", () => this.choose(steering, "overlay", byId("overlay")));
@@ -25,6 +34,7 @@ export class RunChoice {
     const known = JSON.stringify([live, past, over]);
     if (known !== this.known) {
       this.known = known;
+      this.words = new Map([...live, ...past, ...over].map((run) => [run.id, words(run)]));
       byId("run").replaceChildren(group(`live (${live.length})`, live), group("recorded, in runs/", past), ...(over.length ? [group("on show", over)] : []));
       byId("overlay").replaceChildren(make("option", { value: "" }, "no other run"), ...past.map(option));
       byId("runs").hidden = live.length + past.length === 0;
@@ -39,7 +49,16 @@ export class RunChoice {
     return { label: `over: ${title}`, fits: !diverged, told };
   }
 
+  /** Tell why nothing of the run drawn over is seen, where all that is shown comes after its end. */
+  tellUnseen() {
+    const { overlay_end_s: end } = this.listing ?? {};
+    const isSeen = end == null || end > this.viewport.shown[0];
+    put(byId("unseen"), isSeen ? "" : `It ended at ${plain(end)} s, before what is shown: show all, or drag the strip back.`);
+  }
+
+  /** Show what is chosen, and whether it may be chosen here. */
   mark() {
+    if (!this.listing) return;
     const { shown, overlay } = this.listing;
     if (document.activeElement !== byId("run")) byId("run").value = shown ?? "";
     if (document.activeElement !== byId("overlay")) byId("overlay").value = overlay ?? "";
@@ -47,17 +66,20 @@ export class RunChoice {
     byId("others").hidden = others.length === 0;
     put(byId("how-many"), others.length === 1 ? "1 other run is live" : `${others.length} other runs are live`);
     byId("open-other").value = others.at(-1)?.id ?? "";
-    byId("open-other").title = others.at(-1)?.title ?? "";
     const { label, told } = this.behind();
     byId("behind").hidden = !overlay;
-    put(byId("behind"), [label, told].filter(Boolean).join(": "));
+    put(byId("over"), [label, told].filter(Boolean).join(": "));
+    this.tellUnseen();
+    for (const control of [byId("run"), byId("overlay"), byId("open-other")]) {
+      control.disabled = !maySteer();
+      control.title = maySteer() ? (this.words.get(control.value) ?? "") : WATCHING;
+    }
   }
 }
 
-/** The name comes first: what follows it may be cut off. */
-const option = ({ id, title, told }) => {
-  const words = [title, told].filter(Boolean).join(", ");
-  return make("option", { value: id, title: words }, title === id ? words : `${words} (${id})`);
-};
+/** What tells runs apart comes first, of a folder named by its time the time of day: what follows may be cut off. */
+const option = (run) => make("option", { value: run.id, title: words(run) }, words(run, run.id.replace(/^(.*)-\d{8}-(\d{6}.*)$/, "…$2 $1")));
+
+const words = ({ id, title, told }, name = id) => [title === id ? name : `${name}: ${title}`, told].filter(Boolean).join(", ");
 
 const group = (label, runs) => make("optgroup", { label }, ...runs.map(option));
