@@ -58,12 +58,19 @@ def main_line(samples: np.ndarray, rate: float, above_Hz: float = 0.0) -> Line |
     at, height = amplitudes(samples, rate)
     power = np.where(at > above_Hz, height**2, 0.0)
     peak = int(np.argmax(power))
-    first, end = max(0, peak - _HALF_WIDTH), peak + _HALF_WIDTH + 1
     if peak < 2 or height[peak - 1] > height[peak] or not height[peak] > 1e-12 * np.abs(samples).max():
         return None
-    share = float(power[first:end].sum() / power.sum())
-    if share < _STANDS_OUT:
-        return None
+    line = line_at(at, height, peak, float(power[lobe(peak)].sum() / power.sum()))
+    return line if line.share >= _STANDS_OUT else None
+
+
+def lobe(peak: int) -> slice:
+    """Returns where in a spectrum what belongs to the line with this peak is."""
+    return slice(max(0, peak - _HALF_WIDTH), peak + _HALF_WIDTH + 1)
+
+
+def line_at(at: np.ndarray, height: np.ndarray, peak: int, share: float) -> Line:
+    """Returns the line of a peak in a spectrum, its frequency and width between the lines as of ``main_line``."""
     offset = 0.0
     if peak + 1 < len(height):
         low, mid, high = height[peak - 1 : peak + 2]

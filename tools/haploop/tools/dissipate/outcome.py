@@ -14,7 +14,7 @@ from haploop.tools.dissipate.booking import Booked, Booking
 from haploop.tools.dissipate.force_book import Passivity
 from haploop.tools.dissipate.recording.samples import Floats, LogRecording
 from haploop.tools.dissipate.recording.text_recording import TextRecording
-from haploop.tools.dissipate.swing.buzz import Buzz, Overtone, Word
+from haploop.tools.dissipate.swing.buzz import Buzz, Overtone, Several, Word
 from haploop.tools.dissipate.swing.finder import BuzzFinder
 from haploop.tools.render.units import amount
 from haploop.view.look.spectrum import Line
@@ -152,6 +152,8 @@ class Outcome:
         slow: the widest line of a slower motion; None of one without.
         tried: where no element was named, those at hand at sizes of equal largest force, ``EQUAL_N``, best first.
         left_out: a line that was taken for the shape of a slower motion, where no buzz was seen.
+        several: swings at several frequencies at once, where there was no buzz at one.
+        slower: a swing at one frequency from some 3 Hz up to that of a buzz, where no buzz was seen.
     """
 
     recording: Recording
@@ -164,12 +166,16 @@ class Outcome:
     buzz: Buzz | None
     slow: Line | None
     left_out: Overtone | None = None
+    several: Several | None = None
+    slower: Buzz | None = None
     tried: tuple[ElementOutcome, ...] = ()
 
     @property
     def main_Hz(self) -> float | None:
-        """Returns the frequency of the buzz, or of a slower motion that has one; None of others."""
-        line = self.buzz or self.slow
+        """Returns the frequency of the buzz, the widest of several, or that of a slower motion; None of others."""
+        if self.several:
+            return self.several.lines[0][0]
+        line = self.buzz or self.slower or self.slow
         return line.frequency_Hz if line else None
 
     @property
@@ -199,7 +205,9 @@ class Outcome:
             "recorded": sorted(recording.recorded),
             "noise_m": self.noise_m,
             "buzz_word": self.buzz_word,
-            "buzz": self.buzz and asdict(self.buzz) | {"fed_J": self.buzz.fed_J},
+            "buzz": _buzz_data(self.buzz),
+            "several": self.several and self.several._asdict(),
+            "slower": _buzz_data(self.slower),
             "left_out": self.left_out and self.left_out.line._asdict() | {"slower_Hz": self.left_out.slower_Hz},
             "main_Hz": self.main_Hz,
             "samples": notes.pop("rows"),
@@ -209,6 +217,14 @@ class Outcome:
             "tried": [asdict(element) for element in self.tried],
             "force": self.force and self.force.as_data(),
         }
+
+
+def _buzz_data(buzz: Buzz | None) -> dict[str, Any] | None:
+    """Returns a buzz for JSON, a table a span."""
+    if not buzz:
+        return None
+    spans = [span._asdict() for span in buzz.spans]
+    return asdict(buzz) | {"stretches": buzz.stretches, "spans": spans, "fed_J": buzz.fed_J}
 
 
 def make_outcome(
@@ -242,6 +258,7 @@ def make_outcome(
         for table, row, again in zip(scene.dissipation, books, noisier_J, strict=False)
     ]
     force, buzz = None, found.buzz()
+    several = None if buzz else found.several()
     if of := booking.force:
         own = ElementOutcome("recorded-force", {}, "recorded force", *books[-1])
         # The sign of a force in a log is known.
@@ -260,7 +277,9 @@ def make_outcome(
         found.word(),
         buzz,
         found.slow,
-        None if buzz else found.overtone(),
+        None if buzz or several else found.overtone(),
+        several,
+        None if buzz or several or not found.slower else found.slower.buzz(),
     )
 
 

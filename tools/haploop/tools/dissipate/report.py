@@ -47,10 +47,10 @@ _FAST_FORCE = (
     "{elements} is faster than a quarter of the sampling rate. Unless the device buzzed as fast, that is noise of the "
     "estimates, and so may be much of the energy."
 )
-_NO_ELEMENT = (
-    "no element was named. Say which, --damping 2.7, --mass 0.0018, or --element KIND KEY=VALUE in quotes, "
-    "or which column is a force with --force."
-)
+_NAME = "--damping 2.7, --mass 0.0018, or --element KIND KEY=VALUE in quotes, or which column is a force with --force."
+_NO_ELEMENT = f"no element was named, and none of those at hand gives a force on this motion. Say which, {_NAME}"
+_AT_HAND = "what each element at hand would have taken, at a size of the same largest force."
+_OTHERS = f"Others, or other sizes, are booked where they are named: {_NAME}"
 _NO_FORCE = "none of these would have given a force on this motion"
 _BESIDE_WALL = "{none}: it lies from {low} to {high}, and the wall {occupies} {wall}."
 # An inertia above this, kg, is more often a mass in grams: the heaviest device that comes with haploop has 0.2 kg.
@@ -81,9 +81,10 @@ def make_report(outcome: Outcome) -> RenderableType:
     head = Text(f"{outcome.recording.name}: {conclusion(outcome)}", style="bold")
     first = doubtful(outcome)
     doubts = [Text(sentence, style="bold yellow") for sentence in first]
-    buzz = Text(buzz_sentence(outcome), style="bold" if outcome.buzz else "")
+    buzz = Text(buzz_sentence(outcome), style="bold" if outcome.buzz or outcome.several else "")
     tried = [_tried(outcome), Text(_EQUAL.format(equal=amount(EQUAL_N, "N")), style="dim")] if outcome.tried else []
-    said = [sentence for sentence in note_sentences(outcome) if sentence not in first] + [NEXT] * bool(outcome.buzz)
+    said = [sentence for sentence in note_sentences(outcome) if sentence not in first]
+    said += [_OTHERS] * bool(outcome.tried and not outcome.force) + [NEXT] * bool(outcome.buzz or outcome.several)
     notes = (Text(sentence, style="dim") for sentence in said)
     return Group(*doubts, buzz, head, *([table] if rows(outcome) else []), *tried, *notes)
 
@@ -113,7 +114,7 @@ def conclusion(outcome: Outcome) -> str:
     if not outcome.elements and outcome.force:
         return _passivity(outcome)
     if not outcome.elements:
-        return _NO_ELEMENT
+        return _AT_HAND if outcome.tried else _NO_ELEMENT
     if not any(element.strongest_N for element in outcome.elements):
         return _without_force(outcome)
 

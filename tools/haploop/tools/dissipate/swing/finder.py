@@ -1,4 +1,4 @@
-"""The search for a buzz in the windows of a recording."""
+"""The search for a swing in the windows of a recording."""
 
 from __future__ import annotations
 
@@ -7,16 +7,26 @@ from typing import NamedTuple
 import numpy as np
 
 from haploop.tools.dissipate.recording.samples import Floats, Samples
-from haploop.tools.dissipate.swing.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, Buzz, Overtone, Word
+from haploop.tools.dissipate.swing.buzz import (
+    FAST,
+    LASTS_S,
+    LEAST_RATE_HZ,
+    SLOWER,
+    Band,
+    Buzz,
+    Overtone,
+    Several,
+    Span,
+    Word,
+)
 from haploop.tools.dissipate.swing.fed import fed_W
-from haploop.tools.dissipate.swing.lines import is_overtone, overtone_of, swing
+from haploop.tools.dissipate.swing.lines import Slower, is_overtone, overtone_of, swing
+from haploop.tools.dissipate.swing.several import SeveralFinder
 from haploop.view.look.spectrum import Line, main_line
 
-# The spectrum is that of windows so long, a quarter of it apart.
-_WINDOW_S, _HOPS = 0.5, 4
-_RESOLVED_HZ = 1.0 / _WINDOW_S
-# So far from a multiple a line may be for an overtone where the frequency changes within the window.
-_BLURRED_HZ = 0.3 * _RESOLVED_HZ
+# The windows are a quarter of one apart; so many after the first have to swing as well for a swing to last.
+_HOPS = 4
+_NEEDED = _HOPS
 # It goes on to the end of a part whose last half second it swings through, this share of the window before as wide.
 _GOES_ON = 0.9
 # It does not decay below this share while it lasts: what is struck rings shorter.
@@ -44,19 +54,23 @@ class _Window(NamedTuple):
 
 
 class BuzzFinder:
-    """Looks for a buzz in windows of half a second, in bounded memory but for a row a window.
+    """Looks for a swing in windows, in bounded memory but for a row a window.
 
     Args:
         delay_s: from a sample to its force, where one is recorded.
+        band: its frequencies, and how long a window is.
 
     Attributes:
         longest_s: the longest part without a gap that is not bridged.
-        slow: the widest line slower than ``ABOVE_HZ``; None of a motion without one.
+        slow: the widest line slower than the band; None of a motion without one.
+        slower: beside a buzz, the search for a swing just slower than that.
     """
 
-    def __init__(self, period_s: float, delay_s: float = 0.0) -> None:
-        self._delay_s = delay_s
-        self._size = max(4, round(_WINDOW_S / period_s))
+    def __init__(self, period_s: float, delay_s: float = 0.0, band: Band = FAST) -> None:
+        self._delay_s, self._band = delay_s, band
+        self._size = max(4, round(band.window_s / period_s))
+        self._several = SeveralFinder()
+        self.slower = BuzzFinder(period_s, delay_s, SLOWER) if band is FAST else None
         self.rate_Hz = 1.0 / period_s
         self._t_s, self._motion = np.empty(0), np.empty((3, 0))
         self._begins_s = self.longest_s = 0.0
@@ -73,6 +87,8 @@ class BuzzFinder:
 
     def add(self, piece: Samples) -> None:
         """Takes a piece; its times tell a rate that its period is only about."""
+        if self.slower:
+            self.slower.add(piece)
         missing = self._bridged(float(piece.t_s[0])) if piece.begins else 0
         self._whole = len(piece.t_s) + (0 if piece.begins else self._whole)
         if piece.begins and not missing:
@@ -81,8 +97,9 @@ class BuzzFinder:
             self._t_s, self._motion = np.empty(0), np.empty((3, 0))
             self._begins_s = float(piece.t_s[0])
             self._stretches.append([])
+            self._several.part()
         line = main_line(piece.x_m, self.rate_Hz)
-        if line and line.frequency_Hz < ABOVE_HZ and (self.slow is None or line.width > self.slow.width):
+        if line and line.frequency_Hz < self._band.above_Hz and (self.slow is None or line.width > self.slow.width):
             self.slow = line
         force = piece.force_N if piece.held_N is None else piece.held_N
         delay_s = self._delay_s if piece.held_N is None else 0.0
@@ -112,12 +129,14 @@ class BuzzFinder:
         from_s, to_s = float(t_s[0]), float(t_s[-1])
         inside_s = (to_s - from_s) / _HOPS
         rate_Hz = (len(t_s) - 1) / (to_s - from_s)
-        line = swing(x_m, rate_Hz)
-        if line and (slower := overtone_of(line, x_m, rate_Hz, _BLURRED_HZ)):
+        line = swing(x_m, rate_Hz, self._band)
+        if self._band is FAST:
+            self._several.look(from_s if from_s == self._begins_s else from_s + inside_s, to_s - inside_s, x_m, rate_Hz)
+        if line and (slower := overtone_of(line, x_m, rate_Hz, self._band)):
             self._left_out.append(Overtone(line, slower.frequency_Hz))
             line = None
         last = self._stretches[-1]
-        if last and not (line and abs(line.frequency_Hz - last[-1].line.frequency_Hz) < _RESOLVED_HZ):
+        if last and not (line and abs(line.frequency_Hz - last[-1].line.frequency_Hz) < self._band.resolved_Hz):
             last = []
             self._stretches.append(last)
         if line:
@@ -133,8 +152,8 @@ class BuzzFinder:
         if not (last := self._stretches[-1]) or not self._next:
             return {}
         t_s, x_m = self._t_s[-self._size :], self._motion[0, -self._size :]
-        line, before = swing(x_m, (len(t_s) - 1) / float(t_s[-1] - t_s[0])), last[-1].line
-        if line is None or abs(line.frequency_Hz - before.frequency_Hz) >= _RESOLVED_HZ:
+        line, before = swing(x_m, (len(t_s) - 1) / float(t_s[-1] - t_s[0]), self._band), last[-1].line
+        if line is None or abs(line.frequency_Hz - before.frequency_Hz) >= self._band.resolved_Hz:
             return {}
         return {last[-1].to_s: float(t_s[-1])} if line.width >= _GOES_ON * before.width else {}
 
@@ -143,7 +162,8 @@ class BuzzFinder:
 
         Where one stretch lasts, shorter ones at its frequencies count, too, as long as they are as wide.
         """
-        lasting = [kept for stretch in self._stretches if (kept := self._lasting(stretch))]
+        slower = self._slower()
+        lasting = [kept for stretch in self._stretches if (kept := self._lasting(stretch, slower))]
         if not lasting:
             return None
         kept = [window for stretch in lasting for window in stretch]
@@ -151,7 +171,8 @@ class BuzzFinder:
         least_Hz, most_Hz, width_m = min(swings_Hz), max(swings_Hz), max(window.line.width for window in kept)
 
         def is_alike(window: _Window) -> bool:
-            is_near = least_Hz - _RESOLVED_HZ < window.line.frequency_Hz < most_Hz + _RESOLVED_HZ
+            near_Hz = self._band.resolved_Hz
+            is_near = least_Hz - near_Hz < window.line.frequency_Hz < most_Hz + near_Hz
             return is_near and window.line.width >= _KEPT * width_m
 
         shorter = [window for stretch in self._stretches for window in stretch if is_alike(window)]
@@ -162,10 +183,10 @@ class BuzzFinder:
         ends_s = self._part_ends_s | self._end_of_part()
         return Buzz(
             float(np.median(swings_Hz)),
-            0.5 * _RESOLVED_HZ,
+            0.5 * self._band.resolved_Hz,
             least_Hz,
             most_Hz,
-            _joined([(window.from_s, ends_s.get(window.to_s, window.to_s)) for window in told]),
+            self._joined(told, ends_s),
             width_m,
             told[min(_THIRD, len(told) - 1)].line.width,
             told[-1 if told[-1].to_s in ends_s else -min(_THIRD + 1, len(told))].line.width,
@@ -173,28 +194,60 @@ class BuzzFinder:
             moved_W,
         )
 
-    def _lasting(self, stretch: list[_Window]) -> list[_Window]:
+    def _joined(self, told: list[_Window], ends_s: dict[float, float]) -> tuple[Span, ...]:
+        """Joins windows of about one frequency; no pause shorter than a window is told."""
+        spans = list[Span]()
+        last_Hz = 0.0
+        for window in told:
+            to_s, (at_Hz, width_m, _) = ends_s.get(window.to_s, window.to_s), window.line
+            is_near = spans and window.from_s <= spans[-1].to_s + self._band.window_s
+            if is_near and abs(at_Hz - last_Hz) < self._band.resolved_Hz:
+                from_s, until_s, least_Hz, most_Hz, widest_m = spans[-1]
+                ends = max(until_s, to_s), min(least_Hz, at_Hz), max(most_Hz, at_Hz), max(widest_m, width_m)
+                spans[-1] = Span(from_s, *ends)
+            else:
+                spans.append(Span(window.from_s, to_s, at_Hz, at_Hz, width_m))
+            last_Hz = at_Hz
+        return tuple(spans)
+
+    def _slower(self) -> list[Slower]:
+        """Returns the slower motions of which a line may be an overtone."""
+        found = [Slower(self.slow)] if self.slow else []
+        if self.slower and (of := self.slower.buzz()):
+            line = Line(0.5 * (of.least_Hz + of.most_Hz), of.width_m, 1.0)
+            found.append(Slower(line, 0.5 * (of.most_Hz - of.least_Hz)))
+        return found
+
+    def _lasting(self, stretch: list[_Window], slower: list[Slower]) -> list[_Window]:
         """Returns the part of a stretch that lasts without decaying; none where it is an overtone of the motion."""
         widths = [window.line.width for window in stretch]
-        needed = round(4 * (LASTS_S - _WINDOW_S) / _WINDOW_S)
-        lasting = [i for i in range(len(widths) - needed) if widths[i + needed] >= _KEPT * max(widths[i : i + needed])]
-        kept = stretch[lasting[0] : lasting[-1] + needed + 1] if lasting else []
-        if kept and self.slow:
+        decays = [widths[i + _NEEDED] < _KEPT * max(widths[i : i + _NEEDED]) for i in range(len(widths) - _NEEDED)]
+        lasting = [i for i, of in enumerate(decays) if not of]
+        kept = stretch[lasting[0] : lasting[-1] + _NEEDED + 1] if lasting else []
+        if kept:
             frequency_Hz = float(np.median([window.line.frequency_Hz for window in kept]))
-            if is_overtone(frequency_Hz, max(window.line.width for window in kept), self.slow):
-                self._left_out += [Overtone(window.line, self.slow.frequency_Hz) for window in kept]
+            width_m = max(window.line.width for window in kept)
+            if of := next((of for of in slower if is_overtone(frequency_Hz, width_m, of)), None):
+                self._left_out += [Overtone(window.line, of.line.frequency_Hz) for window in kept]
                 return []
         return _filled(kept)
 
+    def several(self) -> Several | None:
+        """Returns the swings at several frequencies at once; None where there were none that last."""
+        return self._several.found(self._slower())[0]
+
     def overtone(self) -> Overtone | None:
         """Returns the widest line that lasted and was left out for an overtone; None where there was none."""
-        lasted = len(self._left_out) > round(4 * (LASTS_S - _WINDOW_S) / _WINDOW_S)
-        return max(self._left_out, key=lambda each: each.line.width) if lasted else None
+        lasted = self._left_out if len(self._left_out) > _NEEDED else []
+        some = [*lasted, *self._several.found(self._slower())[1]]
+        return max(some, key=lambda each: each.line.width, default=None)
 
     def word(self) -> Word:
         """Returns whether the recording buzzes, as far as it can be said."""
         if self.buzz():
             return "buzzes"
+        if self.several():
+            return "buzzes at several frequencies"
         return "none seen" if self.longest_s >= LASTS_S - 1e-9 and self.rate_Hz >= LEAST_RATE_HZ else "cannot say"
 
 
@@ -203,14 +256,3 @@ def _filled(stretch: list[_Window]) -> list[_Window]:
     widths = [window.line.width for window in stretch]
     first = next((i for i, width in enumerate(widths) if width >= _KEPT * widths[min(_FULL, len(widths) - 1)]), 0)
     return stretch[first:]
-
-
-def _joined(spans: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    """Joins spans of time that lie no further apart than a window, which tells no shorter pause."""
-    joined: list[tuple[float, float]] = []
-    for from_s, to_s in sorted(spans):
-        if joined and from_s <= joined[-1][1] + _WINDOW_S:
-            joined[-1] = joined[-1][0], max(joined[-1][1], to_s)
-        else:
-            joined.append((from_s, to_s))
-    return tuple(joined)

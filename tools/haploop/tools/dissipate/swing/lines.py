@@ -1,45 +1,94 @@
-"""Lines in the spectrum of a window: a swing that is felt, or an overtone of a slower motion."""
+"""Lines in the spectrum of a window: swings that are felt, and overtones of a slower motion."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from haploop.launch.stability.traces import is_felt
 from haploop.tools.dissipate.recording.samples import Floats
-from haploop.tools.dissipate.swing.buzz import ABOVE_HZ
-from haploop.view.look.spectrum import Line, main_line
+from haploop.tools.dissipate.swing.buzz import FAST, Band
+from haploop.view.look.spectrum import Line, amplitudes, line_at, lobe, main_line
 
-# A swing at one frequency has so much of the variance of all that is faster than ``ABOVE_HZ``.
-_SHARE = 0.8
+# Of several swings, of which these are the most, each has so much of the variance, and peaks are so many lines apart.
+_MOST, _OF_EACH, _APART = 3, 0.1, 3
 # The staircase of an encoder swings by less than a count, here the step that nine of ten exceed.
 _COUNTS, _SMALLEST = 2.0, 10.0
 # Where its velocity jumps, as at a wall, a slower periodic motion has overtones, at multiples k of its frequency, of no
 # more than this over k^2 of its width. They meet the multiple to so many Hz; of the slowest they are too close.
 _OVERTONE, _APART_HZ, _CLOSE_HZ = 3.5, 0.3, 2.5
+# Where it moves in steps, its overtones have no more than this over k of its width.
+_JUMPS = 1.5
+# In a window in which the frequency changes, or that lines share, they meet it to so many.
+BLURRED_HZ = 0.3 * FAST.resolved_Hz
 
 
-def swing(x_m: Floats, rate_Hz: float) -> Line | None:
-    """Returns the swing of a window that is faster than a hand's, wider than the counts are, and felt."""
-    line = main_line(x_m, rate_Hz, ABOVE_HZ)
+def swing(x_m: Floats, rate_Hz: float, band: Band = FAST) -> Line | None:
+    """Returns the swing of a window that has a frequency of the band, is wider than the counts are, and felt."""
+    t = np.linspace(-1.0, 1.0, len(x_m))
+    flat = x_m - np.polyval(np.polyfit(t, x_m, band.drift), t)
+    line = main_line(flat, rate_Hz, band.above_Hz)
+    if line is None or line.share < band.share or line.frequency_Hz >= band.below_Hz:
+        return None
+    return line if is_felt(line.width, line.frequency_Hz) and line.width > _counts_m(x_m) else None
+
+
+def _counts_m(x_m: Floats) -> float:
+    """Returns how wide the staircase of an encoder may swing."""
     steps = np.abs(np.diff(x_m))
-    if line is None or line.share < _SHARE or not is_felt(line.width, line.frequency_Hz):
-        return None
-    return line if line.width > _COUNTS * np.percentile(steps[steps > 0.0], _SMALLEST) else None
+    return _COUNTS * float(np.percentile(steps[steps > 0.0], _SMALLEST)) if steps.any() else 0.0
 
 
-def is_overtone(frequency_Hz: float, width_m: float, of: Line, apart_Hz: float = _APART_HZ) -> bool:
-    """Tells whether a line of this frequency and width in m may be an overtone of a slower one."""
-    order = frequency_Hz / of.frequency_Hz
-    is_multiple = abs(order - round(order)) * of.frequency_Hz < apart_Hz or of.frequency_Hz < _CLOSE_HZ
-    return is_multiple and width_m < _OVERTONE / order**2 * of.width
+def swings(x_m: Floats, rate_Hz: float) -> tuple[Line, ...]:
+    """Returns the swings of a window at several frequencies at once, from slow to fast; empty where there are none.
 
-
-def overtone_of(line: Line, x_m: Floats, rate_Hz: float, apart_Hz: float) -> Line | None:
-    """Returns the slower line of a window of which another may be an overtone; None where there is none.
-
-    ``apart_Hz`` is how far from a multiple it may be, as where the frequency changes within the window.
+    All are faster than a hand's, wider than the counts are, and felt.
     """
+    at, height = amplitudes(x_m, rate_Hz)
+    power = np.where(at > FAST.above_Hz, height**2, 0.0)
+    if not (whole := float(power.sum())):
+        return ()
+    peaks = 1 + np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:]) & (power[1:-1] > 0.0))
+    chosen, together = list[int](), np.zeros(len(power), bool)
+    for peak in peaks[np.argsort(-height[peaks])].tolist():
+        if len(chosen) < _MOST and all(abs(peak - other) >= _APART for other in chosen):
+            chosen.append(peak)
+    lines = [line_at(at, height, peak, float(power[lobe(peak)].sum()) / whole) for peak in sorted(chosen)]
+    told = [line for line in lines if line.share >= _OF_EACH]
+    for peak in (peak for peak, line in zip(sorted(chosen), lines, strict=True) if line in told):
+        together[lobe(peak)] = True
+    if len(told) < 2 or float(power[together].sum()) < FAST.share * whole:
+        return ()
+    counts_m = _counts_m(x_m)
+    return tuple(told) if all(is_felt(each.width, each.frequency_Hz) and each.width > counts_m for each in told) else ()
+
+
+class Slower(NamedTuple):
+    """A slower motion at one frequency, which may differ so much from window to window, Hz."""
+
+    line: Line
+    spread_Hz: float = 0.0
+
+
+def is_overtone(
+    frequency_Hz: float, width_m: float, of: Slower, apart_Hz: float = _APART_HZ, of_jumps: bool = False
+) -> bool:
+    """Tells whether a line of this frequency and width in m may be an overtone of a slower one.
+
+    ``of_jumps``: also of one of which the position itself seems to jump, unless it is so slow that steps stand apart.
+    """
+    slower, spread_Hz = of
+    order = frequency_Hz / slower.frequency_Hz
+    if slower.frequency_Hz < _CLOSE_HZ:
+        return width_m < _OVERTONE / order**2 * slower.width
+    is_multiple = order > 1.5 and abs(order - round(order)) * slower.frequency_Hz < apart_Hz + order * spread_Hz
+    return is_multiple and width_m < (_JUMPS / order if of_jumps else _OVERTONE / order**2) * slower.width
+
+
+def overtone_of(line: Line, x_m: Floats, rate_Hz: float, band: Band) -> Line | None:
+    """Returns the line of a window, slower than the band, of which another may be an overtone; None without one."""
     slower = main_line(x_m, rate_Hz)
-    if not slower or slower.frequency_Hz >= ABOVE_HZ:
+    if not slower or slower.frequency_Hz >= band.above_Hz:
         return None
-    return slower if is_overtone(line.frequency_Hz, line.width, slower, apart_Hz) else None
+    return slower if is_overtone(line.frequency_Hz, line.width, Slower(slower), BLURRED_HZ) else None

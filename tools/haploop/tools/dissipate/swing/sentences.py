@@ -5,16 +5,20 @@ from __future__ import annotations
 from typing import Any
 
 from haploop.tools.dissipate.outcome import Outcome
-from haploop.tools.dissipate.swing.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, Buzz, Word
+from haploop.tools.dissipate.swing.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, SLOWER, Buzz, Span, Word
 from haploop.tools.dissipate.swing.fed import LEAST_FED
 from haploop.tools.render.units import amount
 
 _BUZZ: dict[Word, str] = {
     "buzzes": "The recording buzzes: it swings at {frequency}, {width} peak to peak at most, {when}; "
     "pauses of less than half a second are not told.",
+    "buzzes at several frequencies": (
+        "The recording buzzes at several frequencies at once: {lines} peak to peak at most, together up to {width}, "
+        "{when}."
+    ),
     "none seen": (
-        "No{other} swing at one frequency above {above:g} Hz was seen that lasts {lasts:g} s and is wide enough to be "
-        "felt. Slower ones, and swings at several frequencies at once, are not looked for."
+        "No{other} swing above {above:g} Hz was seen, at one frequency or up to three at once, that lasts {lasts:g} s "
+        "and is wide enough to be felt. Motion without a frequency is not looked for."
     ),
     "cannot say": (
         "Whether the recording buzzes cannot be said: that takes {lasts:g} s without a gap, and {rate:g} samples a "
@@ -22,6 +26,11 @@ _BUZZ: dict[Word, str] = {
     ),
 }
 _ONE_HZ, _MOVING_HZ = "{0:.1f} Hz (give or take {1:g} Hz)", "{0:.0f} to {1:.0f} Hz"
+# Of so many spans with frequencies of their own each is told.
+_MOST_SPANS = 4
+_SPAN = "{frequency} ({width}) from about {from_s:.1f} s to {to_s:.1f} s"
+_LINE = "{0:.1f} Hz, {1}"
+_NOT_FED = " What a recorded force gives to a swing is told of one at one frequency alone."
 _ONCE, _AGAIN = "from about {0:.1f} s to {1:.1f} s", "{0} times between about {1:.1f} s and {2:.1f} s, {3:.1f} s in all"
 _GREW, _DIED, _STAYED = " It grew from {0} to {1}.", " It died down from {0} to {1}.", " It stayed as wide."
 # It grew, or died down, by so much.
@@ -36,7 +45,11 @@ _EITHER = (
     "sign, which is in doubt."
 )
 _NEITHER = " The recorded force neither fed this swing nor took from it, but for a hundredth of what went to and fro."
-_SLOWER = " It swings at {main:.3g} Hz, {width} peak to peak at most, which a hand can, too."
+_SLOWER = (
+    " It swings at {frequency}, {width} peak to peak at most, {when}: slower than the {above:g} Hz from which on it is "
+    "called a buzz; a hand's own motion, its tremor or a slow limit cycle, which a recording alone cannot tell apart."
+)
+_HAND = " Its widest swing is at {main:.3g} Hz, {width} peak to peak at most, which a hand can, too."
 NEXT = (
     "Which wall and which element suit the device: describe it in a file (haploop scenes premium15 prints one to start "
     "from), and run haploop advise FILE."
@@ -70,23 +83,50 @@ def buzz_sentence(outcome: Outcome) -> str:
         "other": " other" if outcome.left_out else "",
     }
     if buzz := outcome.buzz:
-        moves = buzz.most_Hz - buzz.least_Hz > 2.0 * buzz.within_Hz
-        of_Hz = (buzz.least_Hz, buzz.most_Hz) if moves else (buzz.frequency_Hz, buzz.within_Hz)
-        limits["frequency"] = (_MOVING_HZ if moves else _ONE_HZ).format(*of_Hz)
-        limits["width"] = amount(buzz.width_m, "m")
-        from_s, to_s = buzz.stretches[0][0], buzz.stretches[-1][1]
-        times = len(buzz.stretches)
-        limits["when"] = _ONCE.format(from_s, to_s) if times == 1 else _AGAIN.format(times, from_s, to_s, buzz.lasts_s)
+        limits |= _told(buzz)
+    if several := outcome.several:
+        limits["lines"] = " and ".join(_LINE.format(at_Hz, amount(width_m, "m")) for at_Hz, width_m in several.lines)
+        limits["width"] = amount(several.width_m, "m")
+        limits["when"] = _ONCE.format(several.from_s, several.to_s)
     words = _BUZZ[outcome.buzz_word].format(**limits)
     if outcome.buzz:
         sign_is_known = not outcome.force or outcome.force.passivity != "other sign"
         return words + _course(outcome.buzz) + _fed(outcome.buzz, sign_is_known)
-    if slow := outcome.slow:
-        words += _SLOWER.format(main=slow.frequency_Hz, width=amount(slow.width, "m"))
+    if several:
+        return words + _NOT_FED * bool(outcome.force)
+    if outcome.slower:
+        words += _SLOWER.format(**limits | _told(outcome.slower))
+    if (slow := outcome.slow) and not (outcome.slower and slow.frequency_Hz > SLOWER.above_Hz):
+        words += _HAND.format(main=slow.frequency_Hz, width=amount(slow.width, "m"))
     if not (of := outcome.left_out):
         return words
     numbers = {"at": of.line.frequency_Hz, "width": amount(of.line.width, "m"), "order": of.order, "of": of.slower_Hz}
     return words + _LEFT_OUT.format(**numbers)
+
+
+def _told(buzz: Buzz) -> dict[str, str]:
+    """Returns at which frequency it swings, how wide and when; spans with frequencies of their own by themselves."""
+    moves = _moves(buzz.least_Hz, buzz.most_Hz, buzz)
+    of_Hz = (buzz.least_Hz, buzz.most_Hz) if moves else (buzz.frequency_Hz, buzz.within_Hz)
+    told = {"frequency": (_MOVING_HZ if moves else _ONE_HZ).format(*of_Hz), "width": amount(buzz.width_m, "m")}
+    from_s, to_s = buzz.stretches[0][0], buzz.stretches[-1][1]
+    times = len(buzz.spans)
+    if moves and 1 < times <= _MOST_SPANS:
+        return told | {"when": " and ".join(_span(span, buzz) for span in buzz.spans)}
+    return told | {
+        "when": _ONCE.format(from_s, to_s) if times == 1 else _AGAIN.format(times, from_s, to_s, buzz.lasts_s)
+    }
+
+
+def _moves(least_Hz: float, most_Hz: float, buzz: Buzz) -> bool:
+    return most_Hz - least_Hz > 2.0 * buzz.within_Hz
+
+
+def _span(span: Span, buzz: Buzz) -> str:
+    from_s, to_s, least_Hz, most_Hz, width_m = span
+    moves = _moves(least_Hz, most_Hz, buzz)
+    frequency = _MOVING_HZ.format(least_Hz, most_Hz) if moves else f"{0.5 * (least_Hz + most_Hz):.1f} Hz"
+    return _SPAN.format(frequency=frequency, width=amount(width_m, "m"), from_s=from_s, to_s=to_s)
 
 
 def _course(buzz: Buzz) -> str:
