@@ -38,6 +38,9 @@ _API = """\
 ::: haploop.api.studies
     options: {show_root_heading: false, members: [sweep, advise, compare, dissipate, plot]}
 
+::: haploop.api.results
+    options: {members: [AdviceResult, ComparisonResult], inherited_members: true, show_root_heading: false}
+
 ::: haploop.logger.log.stream
     options: {members: [read, LogStream], show_root_heading: false}
 

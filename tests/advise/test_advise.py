@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from haploop import api
+from haploop.api.results import AdviceResult
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.file import load
@@ -16,7 +18,7 @@ from haploop.launch.stability.judge import judge_scene
 from haploop.logger.log.recording import MemoryLog
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.advise.advice import advised_scene, ending_with, is_ideal
+from haploop.tools.advise.advice import advice_data, advised_scene, ending_with, is_ideal
 from haploop.tools.advise.families import DAMPING
 from haploop.tools.advise.known import PUBLISHED, formulas
 from haploop.tools.advise.report import assumes, describe_hand
@@ -26,6 +28,7 @@ from haploop.tools.advise.walls.cases import Case, make_loop
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.withstand import Best, rounded_down
 from haploop.tools.cli.app import app
+from helpers.data.advices import ADVICE
 from helpers.scenes.least import KINDS
 from helpers.scenes.presets import loop_of
 
@@ -68,6 +71,19 @@ def test_a_safe_stiffness_is_rounded_down(value, down):
     assert rounded_down(value) == pytest.approx(down)
 
 
+def test_an_advice_tells_in_python_what_is_recommended_and_prints_as_the_command_does():
+    assert ADVICE.recommended == {
+        "element": "damping", "stiffness_N_m": 1640.0, "parameters": {"damping.damping": 1.1},
+    }  # fmt: skip
+    assert (ADVICE.stiffness_N_m, ADVICE.element, ADVICE.without_N_m) == (1640.0, "damping", 910.0)
+    assert advice_data(ADVICE, [])["recommended"] == ADVICE.recommended
+    assert repr(ADVICE) == "<Advice on mine: 1640 N/m with 1.1 N s/m of damping>"
+    printed = str(AdviceResult(**vars(ADVICE)))
+    assert printed.startswith("Advice on mine.")
+    assert "1.64 N/mm with 1.1 N s/m of damping" in printed
+    assert "\x1b" not in printed
+
+
 @pytest.mark.long
 @pytest.mark.slow
 def test_an_advice_says_first_that_it_is_an_upper_bound_goes_on_when_stopped_and_leaves_scenes_that_rest_and_swing(
@@ -81,6 +97,14 @@ def test_an_advice_says_first_that_it_is_an_upper_bound_goes_on_when_stopped_and
     assert found["headline"].startswith("Upper bound, not advice: premium15 is taken as rigid")
     assert "for a hand: of 0.269 kg, 6.43 N s/m and 105 N/m, holding through a grip of " in found["advice"]
     assert "loses most: no friction: 0." in found["advice"]
+    told = api.advise("premium15", workers=1, out=out)
+    assert told.recommended == found["recommended"]
+    assert (told.stiffness_N_m, told.element) == (found["recommended"]["stiffness_N_m"], "nothing")
+    assert repr(told).startswith("<Advice on premium15: at most ")
+    assert len(repr(told)) < 120
+    assert str(told).startswith("Upper bound, not advice")
+    assert "advice_breaks.toml: the case that breaks first, at " in done.stderr
+    assert "the wall alone (1 of 7) ..." in done.stderr
     lines = (out / "walls.jsonl").read_text().splitlines()
     advised = load(out / "advice.toml")
     assert value_at(advised, "wall.stiffness") == found["recommended"]["stiffness_N_m"]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+import re
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -10,16 +12,21 @@ from typing import Any
 import pytest
 
 from haploop.protocol.scene.paths import value_at, with_value
+from haploop.tools.advise import advice as of_advice
+from haploop.tools.advise import search as of_search
 from haploop.tools.advise.advice import Changed
 from haploop.tools.advise.changes import Borne, changed_limits
+from haploop.tools.advise.command import breaks_words
 from haploop.tools.advise.families import DAMPING, NOTHING, Family, Values
-from haploop.tools.advise.report import answer, describe
-from haploop.tools.advise.search import Found
+from haploop.tools.advise.report import _changes as changes_table
+from haploop.tools.advise.report import answer, describe, describe_run, format_limit
+from haploop.tools.advise.search import STAGES, Found
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.walls.store import Failure, Job, Store
 from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.advise.withstand import Best
 from helpers.scenes.presets import loop_of
+from helpers.shown import row, shown
 
 LATE, EARLY = (loop_of("premium15", f"clock.round_trip_delay={delay}") for delay in (1.5e-3, 0.7e-3))
 # Which of its quantities are 20 % more in the corners that are hardest on that device, the others less.
@@ -50,10 +57,10 @@ class Made:
 
 
 def test_the_element_is_tuned_anew_for_each_change_and_left_out_where_that_bears_more() -> None:
-    """Kept at 5 N s/m the wall would gain 1.5 times by less delay, at 7.1 twice; without, as much as in the formula."""
+    """Kept at 5 N s/m the wall would gain 1.5 times by less delay, at 10, which is tried last, 2.7 times."""
     late, early = changed_limits(made := Made(), [LATE, EARLY], found_with(DAMPING, (5.0,), 2400.0, 400.0))  # type: ignore[arg-type]
-    assert (late.values, early.values) == ((5.0,), (7.1,))
-    assert early.limit.stiffness_N_m == pytest.approx(1e3 * 8.1 / 1.7, rel=0.07)
+    assert (late.values, early.values) == ((5.0,), (10.0,))
+    assert early.limit.stiffness_N_m == pytest.approx(1e3 * 11.0 / 1.7, rel=0.07)
     assert late.alone.stiffness_N_m == pytest.approx(400.0, rel=0.07)
     assert early.alone.stiffness_N_m == pytest.approx(1e3 / 1.7, rel=0.07)
     assert made.corners == {(), CORNER}
@@ -106,8 +113,51 @@ def test_what_gains_without_the_element_alone_is_told_as_that_and_no_change_is_s
     assert told_with(changed(1.5, 1.5), ())["gains most"] == "delay halved: 1.5 times"
 
 
-def test_what_the_verdict_says_beside_its_word_stands_with_the_wall() -> None:
-    assert told_with(changed(1.0, 1.0))["safe up to"].endswith("than a hand feels, only friction holds it")
+def test_what_the_verdict_says_beside_its_word_has_a_line_of_its_own() -> None:
+    told = told_with(changed(1.0, 1.0))
+    assert told["safe up to"].endswith("swinging by less than a hand feels")
+    assert told["its run"].endswith("says beside its verdict: only friction holds it")
+    both = describe_run(("only friction holds it", "at some holds of its hand", "its force ripples"))
+    assert "only friction holds it, its force ripples; the pushes of that verdict are at some holds" in both
+    assert both.endswith("the safe wall was tried at all of them")
+
+
+def test_a_factor_within_what_both_limits_are_known_to_is_told_as_no_change() -> None:
+    def times(stiffness_N_m: float, fails_N_m: float) -> list[str]:
+        base = Borne(Limit(2020.0, 2140.0), Limit(2020.0, 2140.0))
+        some = Changed.from_borne("delay halved", Borne(Limit(stiffness_N_m, fails_N_m), base.alone), base)
+        told: Any = SimpleNamespace(
+            found=found_with(DAMPING, (5.0,), 2000.0, 1000.0),
+            changed=(some,), without=(), unchanged=Changed.from_borne("as it is", base, base),
+        )  # fmt: skip
+        return row(shown(changes_table(told)), "delay halved")
+
+    assert times(2140.0, 2270.0) == ["2.1 N/mm", "same", "2.0 N/mm", "same"]
+    assert times(1600.0, 1700.0) == ["1.6 N/mm", "0.79", "2.0 N/mm", "same"]
+
+
+def test_an_element_with_which_no_wall_as_soft_as_was_tried_is_safe_is_told_with_that_wall() -> None:
+    failure = Failure("a case", 1.0, gone=False)
+    assert format_limit(Limit(0.0, 310.0, failure)) == "below 0.31 N/mm"
+    assert format_limit(Limit(0.0, 1.0, failure)) == "none"
+
+
+def test_the_line_of_the_scene_that_breaks_says_on_which_wall_that_is() -> None:
+    broken = 390.0, Failure("hold x 1", 1.0, gone=False)
+
+    def words(stiffness_N_m: float, verdict: str) -> str:
+        scene = SimpleNamespace(wall=SimpleNamespace(stiffness=stiffness_N_m), run=SimpleNamespace(verdict=verdict))
+        told: Any = SimpleNamespace(breaks=scene, found=SimpleNamespace(breaks=broken))
+        return breaks_words(told)
+
+    assert words(665.0, "pushed").startswith(": the case that breaks first, at 0.67 N/mm: at 0.39 N/mm it is felt, yet")
+    assert words(390.0, "pushed") == ": the case that breaks first, at 0.39 N/mm"
+    assert "to the end of the quarter second" in words(390.0, "window")
+
+
+def test_the_stages_of_an_advice_are_told_by_their_place_among_all() -> None:
+    source = "".join(inspect.getsource(module) for module in (of_search, of_advice))
+    assert tuple(re.findall(r'stage\("([^"]+)"\)', source)) == STAGES
 
 
 def test_a_frequency_is_told_of_a_line_alone_and_both_senses_where_both_feel_it() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from haploop.api.results import ComparisonResult
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Encoder, Scene
 from haploop.tools.advise import families
@@ -21,11 +22,12 @@ from haploop.tools.advise.walls.store import Store
 from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.compare import bench as of_bench
 from haploop.tools.compare.bench import BESIDE, Effort, Job, Row, Shown, along, bench, gentlest
-from haploop.tools.compare.comparison import AGAIN, TOLD, Comparison, Kept, OfLoop, bounded_N_m, plays
+from haploop.tools.compare.comparison import AGAIN, TOLD, Comparison, Kept, OfLoop, _each, bounded_N_m, plays
 from haploop.tools.compare.conditions import draw
 from haploop.tools.compare.page import page, places, sentences
 from haploop.tools.compare.ranking import best, choice, held, ranking
 from haploop.tools.compare.report import comparison_data, report
+from haploop.tools.executor.executors import make_executor
 from haploop.tools.search.intervals import mean_interval
 from helpers.scenes.least import KINDS
 from helpers.shown import shown
@@ -261,3 +263,31 @@ def test_inertia_as_the_page_tuned_it_holds_more_than_nothing_behind_a_cable_und
     without, inertia = found[: len(cases)], found[len(cases) :]
     more = [one.rendered.held_N_m - than.rendered.held_N_m for one, than in zip(inertia, without, strict=True)]
     assert mean_interval(more).low > 0.0
+
+
+def test_a_comparison_tells_in_python_what_to_take_and_prints_as_the_command_does():
+    told, same = (ComparisonResult(**vars(of)) for of in (compared(bidirectional_inertia=2000.0), compared()))
+    assert told.recommended["element"] == told.most["element"] == "bidirectional inertia"
+    assert told.recommended["held_N_m"] == told.held_N_m["bidirectional inertia"] == pytest.approx(2000.0)
+    assert told.recommended["parameters"] == {"bidirectional-inertia.mass": 1.0}
+    assert same.recommended == {"element": "nothing", "held_N_m": pytest.approx(1000.0), "parameters": {}}
+    assert repr(told).startswith("<Comparison on a device: ")
+    assert "\n" not in repr(told)
+    assert str(told).startswith("All stabilizers on a device, each tuned alike.")
+    assert comparison_data(told)["recommended"] == told.recommended
+
+
+def test_a_comparison_tells_how_many_of_how_many_are_done_and_counts_what_was_kept(tmp_path):
+    told: list[tuple[str, int]] = []
+    done: list[str] = []
+
+    def stage(name: str, count: int):
+        told.append((name, count))
+        return lambda: done.append(name)
+
+    kept = Kept(tmp_path / "rows.jsonl")
+    with make_executor(1) as executor:
+        for _ in range(2):
+            _each(float, {"a": 1.0, "b": 2.0}, kept, executor, stage, "walls", float)
+    assert told == [("walls", 2)] * 2
+    assert done == ["walls"] * 4

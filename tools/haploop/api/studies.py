@@ -14,9 +14,8 @@ from haploop.launch.runs.result import Result
 from haploop.launch.scene.toml_writer import to_toml
 
 if TYPE_CHECKING:
-    from haploop.tools.advise.advice import Advice
+    from haploop.api.results import AdviceResult, ComparisonResult
     from haploop.tools.advise.subject import Subject
-    from haploop.tools.compare.comparison import Comparison
     from haploop.tools.dissipate.outcome import Outcome
     from haploop.tools.sweep.table import SweepTable
 
@@ -79,7 +78,7 @@ def advise(
     plugins: Plugins = (),
     workers: int | None = None,
     out: str | Path | None = None,
-) -> Advice:
+) -> AdviceResult:
     """Says how stiff a wall is safe on a device, with which element, and what breaks it first; takes minutes.
 
     Args:
@@ -92,6 +91,7 @@ def advise(
     Raises:
         InvalidRequest, SceneError, PluginError, ElementError: a name is none, or the scene cannot be run.
     """
+    from haploop.api.results import AdviceResult
     from haploop.tools.advise.advice import advice
     from haploop.tools.advise.command import WALLS
     from haploop.tools.advise.walls.store import Store
@@ -99,20 +99,21 @@ def advise(
 
     subject = _subject(device, values, plugins, hand=hand, delay=delay, estimator=estimator)
     with _kept(out, WALLS) as walls, Trial(Store(walls), workers, lambda runs: None) as trial:
-        return advice(subject, trial, lambda stage: None)
+        return AdviceResult(**vars(advice(subject, trial)))
 
 
 def compare(
     device: str | Path, *, grid: bool = True, workers: int | None = None, out: str | Path | None = None, **asked: Any
-) -> Comparison:
+) -> ComparisonResult:
     """Compares every stabilizer, each tuned alike, on a device or a scene; takes some minutes.
 
     Arguments and errors are those of ``advise``; ``grid``: also with more delay, a finer encoder, a slower drive.
     """
+    from haploop.api.results import ComparisonResult
     from haploop.tools.compare.command import ROWS, find
 
     with _kept(out, ROWS) as rows:
-        return find(_subject(device, **asked), grid, workers, rows)
+        return ComparisonResult(**vars(find(_subject(device, **asked), grid, workers, rows)))
 
 
 def _subject(device: str | Path, values: Values = (), plugins: Plugins = (), **names: Any) -> Subject:

@@ -49,8 +49,9 @@ READING = (
     "alone. Attacked: at all holds, sways and approaches, as the first line; a dash where that was not tried, since "
     "another bears more, or nearly as much with fewer elements. * where stiffer walls bear what a softer one does "
     "not. Changes and assumptions: as described and in the corners hardest on the wall, at the three holds, with the "
-    "element advised at half to 1.4 of its size, whichever suits the change, or none; and without one. What is assumed "
-    "counts as described; none is attacked."
+    "element advised at half to 1.4 of its size, and twice as far where an end of that suits best, or none; and "
+    "without one: same where the difference is within what the limits are known to. What is assumed counts as "
+    "described; none is attacked. Below: that wall fails, and none softer was tried."
 )
 UNCHANGED = "as it is"
 SAFE_MEANS = (
@@ -124,7 +125,39 @@ class Advice:
     provisos: tuple[str, ...] = ()
 
     @property
+    def recommended(self) -> dict[str, Any]:
+        """What is recommended, as in ``advice.json``: ``element``, ``stiffness_N_m`` and ``parameters``."""
+        return {"element": self.element, "stiffness_N_m": self.stiffness_N_m, "parameters": self.parameters}
+
+    @property
+    def stiffness_N_m(self) -> float:
+        """The stiffest safe wall, N/m, rounded down; 0 where no wall is safe."""
+        return self.found.stiffness_N_m
+
+    @property
+    def element(self) -> str:
+        """The name of the element to use with that wall; ``nothing`` where none is worth having."""
+        return self.found.advised.family.name
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The parameters of that element in SI units (N s/m, kg, s, N/m), by ``kind.key``; empty for none."""
+        best = self.found.advised
+        return {f"{kind}.{key}": size for (kind, key), size in zip(best.family.parts, best.values, strict=True)}
+
+    @property
+    def without_N_m(self) -> float:
+        """The stiffest safe wall without an element, N/m; 0 where none is."""
+        return self.found.alone_N_m
+
+    def __repr__(self) -> str:
+        at_most, best = "at most " if self.is_ideal else "", self.found.advised
+        wall = spring(self.stiffness_N_m) if self.stiffness_N_m else "no wall"
+        return f"<Advice on {self.name}: {at_most}{wall} with {best.family.phrase(best.values)}>"
+
+    @property
     def headline(self) -> str:
+        """What the device is taken for, and what was varied; the answer is ``recommended``."""
         lead = (UPPER_BOUND if self.is_ideal else ADVICE).format(name=self.name)
         return f"{lead} {reach(self.uncertain, self.not_varied)}"
 
@@ -253,11 +286,9 @@ def ending_with(scene: Scene, loop: Scene, at_s: float) -> Scene | None:
 
 def advice_data(told: Advice, sentences: list[str]) -> AdviceData:
     """Returns the advice as one JSON object: what is recommended and the sentences first, then all that was found."""
-    best = told.found.advised
-    sizes = {f"{kind}.{key}": size for (kind, key), size in zip(best.family.parts, best.values, strict=True)}
     return {
         "headline": told.headline,
-        "recommended": {"element": best.family.name, "stiffness_N_m": told.found.stiffness_N_m, "parameters": sizes},
+        "recommended": told.recommended,
         "safe_means": SAFE_MEANS,
         "reading": READING,
         "advice": " ".join(sentences),

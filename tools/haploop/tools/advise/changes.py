@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from haploop.launch.plan.effects import all_effects
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.advise.families import Values, around
+from haploop.tools.advise.families import Values, around, scaled_values
 from haploop.tools.advise.search import Found
 from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case
 from haploop.tools.advise.walls.corners import ASSUMED, DELAY, Corner, delay_s, ranges, scale_quantities
@@ -97,21 +97,38 @@ def changed_limits(trial: Trial, loops: Sequence[Scene], found: Found) -> list[B
     """
     best, near = found.advised, found.stiffness_N_m or found.advised.nominal.stiffness_N_m
     sizes = around(best.values) if best.values else []
-    queries: list[Query] = []
-    for loop in loops:
-        cases = _cases(loop, found.hardest)
-        for values in sizes:
-            queries.append(
-                Query(loop, best.family.elements(values), cases, _rungs(near), max(LEAST_N_M, near * _LEAST))
-            )
-        queries.append(Query(loop, (), cases, _rungs(found.alone_N_m or near)))
-    some, each, borne = limits(trial, queries, CLOSE), len(sizes) + 1, []
-    for i in range(0, len(some), each):
-        *tuned, alone = some[i : i + each]
-        limit, values = max(zip(tuned, sizes, strict=True), key=lambda row: row[0].stiffness_N_m, default=(alone, ()))
+    cases = [_cases(loop, found.hardest) for loop in loops]
+
+    def query(place: int, values: Values) -> Query:
+        least_N_m = max(LEAST_N_M, near * _LEAST)
+        return Query(loops[place], best.family.elements(values), cases[place], _rungs(near), least_N_m)
+
+    without = [Query(loop, (), of, _rungs(found.alone_N_m or near)) for loop, of in zip(loops, cases, strict=True)]
+    asked = [(place, values) for place in range(len(loops)) for values in sizes]
+    some = limits(trial, [*without, *(query(*each) for each in asked)], CLOSE)
+    known: list[dict[Values, Limit]] = [{} for _ in loops]
+    for (place, values), limit in zip(asked, some[len(loops) :], strict=True):
+        known[place][values] = limit
+    # Where what suits a changed loop lies at an end of the sizes it may lie beyond.
+    beyond = [(place, values) for place, of in enumerate(known) for values in outward(of)]
+    for (place, values), limit in zip(beyond, limits(trial, [query(*each) for each in beyond], CLOSE), strict=True):
+        known[place][values] = limit
+    borne = []
+    for alone, of in zip(some, known, strict=False):
+        values, limit = max(of.items(), key=lambda row: row[1].stiffness_N_m, default=((), alone))
         with_one = limit.stiffness_N_m > alone.stiffness_N_m
         borne.append(Borne(limit, alone, values) if with_one else Borne(alone, alone))
     return borne
+
+
+def outward(known: Mapping[Values, Limit]) -> list[Values]:
+    """Returns two more sizes beyond that which bears most, where it is the smallest or the largest."""
+    sizes = sorted(known)
+    if not sizes:
+        return []
+    most = max(sizes, key=lambda values: known[values].stiffness_N_m)
+    ends = {sizes[0]: (-0.5, -1.0), sizes[-1]: (0.5, 1.0)}
+    return [scaled_values(most, half) for half in ends.get(most, ())]
 
 
 def _rungs(near_N_m: float) -> tuple[float, ...]:

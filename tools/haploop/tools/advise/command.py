@@ -16,7 +16,8 @@ from haploop.logger.summary import finite
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.tools.advise.advice import Advice, AdviceData, advice, advice_data
 from haploop.tools.advise.figure import draw
-from haploop.tools.advise.report import report, sentences
+from haploop.tools.advise.report import format_stiffness, report, sentences
+from haploop.tools.advise.search import STAGES
 from haploop.tools.advise.subject import InvalidRequest, Subject, make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop
 from haploop.tools.advise.walls.store import Store
@@ -73,8 +74,8 @@ def advise(
     data = _write(found, out)
     if as_json:
         print_json(data)
-    for path in data["files"].values():
-        print(path, file=sys.stderr)
+    for key, path in data["files"].items():
+        print(path + (breaks_words(found) if key == "breaks" else ""), file=sys.stderr)
 
 
 def _output(out: Path | None, asked: Subject) -> Path:
@@ -89,6 +90,19 @@ def _output(out: Path | None, asked: Subject) -> Path:
     elif not (out / _ASKED).exists() or (out / _ASKED).read_text(encoding="utf-8") != scene:
         raise OutputError(_OF_ANOTHER.format(out=out, asked=out / _ASKED))
     return out
+
+
+def breaks_words(found: Advice) -> str:
+    """Returns what the scene of the case that breaks first shows, which may be a stiffer wall than that told to."""
+    scene, broken = found.breaks, found.found.breaks
+    assert scene
+    assert scene.wall
+    assert broken
+    if scene.run.verdict != "pushed":
+        return ": the case that breaks first, to the end of the quarter second in which it is felt"
+    shown, told = format_stiffness(scene.wall.stiffness), format_stiffness(broken[0])
+    at = f": the case that breaks first, at {shown}"
+    return at if shown == told else f"{at}: at {told} it is felt, yet the verdict of its run is not unsteady"
 
 
 def _write(found: Advice, out: Path) -> AdviceData:
@@ -115,9 +129,9 @@ def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[int], None]]]
     with screen.status("starting") if screen.is_terminal else contextlib.nullcontext() as status:
 
         def stage(name: str) -> None:
-            now[0] = name
+            now[0] = f"{name} ({STAGES.index(name) + 1} of {len(STAGES)})"
             if not status:
-                print(f"{name} ...", file=sys.stderr)
+                print(f"{now[0]} ...", file=sys.stderr)
 
         def on_progress(runs: int) -> None:
             if status:

@@ -153,7 +153,12 @@ def beside(values: Values) -> list[Values]:
 
 def around(values: Values) -> list[Values]:
     """Returns parameters at half, 0.7, once and 1.4 of their sizes, all by the same."""
-    return [tuple(_rounded(value * FACTOR**half) for value in values) for half in (-1.0, -0.5, 0.0, 0.5)]
+    return [scaled_values(values, half) for half in (-1.0, -0.5, 0.0, 0.5)]
+
+
+def scaled_values(values: Values, steps: float) -> Values:
+    """Returns parameters so many steps larger, all by the same."""
+    return tuple(_rounded(value * FACTOR**steps) for value in values)
 
 
 def together(damping: Values, inertia: Values) -> list[Values]:

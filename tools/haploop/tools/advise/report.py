@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -10,7 +11,7 @@ from rich.text import Text
 
 from haploop.tools.advise.advice import READING, Advice, Changed
 from haploop.tools.advise.changes import CLOSE
-from haploop.tools.advise.walls.limit import Limit
+from haploop.tools.advise.walls.limit import LEAST_N_M, Limit
 from haploop.tools.advise.walls.store import Failure
 from haploop.tools.advise.withstand import ROUGH, WORTH, Best
 from haploop.tools.render.terminal import make_facts, make_table
@@ -32,6 +33,10 @@ _HAND = "of {0} kg, {1} N s/m and {2} N/m{3}, each 20 % more or less; another ma
 _GRIP = ", holding through a grip of {0} N s/m and {1} N/m"
 _NO_HAND = "none but its force: a hand may make this wall buzz (--hand)"
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
+# What its run adds to "steady", which the search has tried at every hold.
+_SOME_HOLDS = "at some holds of its hand"
+_ADDS = "of advice.toml, haploop run says beside its verdict: {0}"
+_PUSHED = "the pushes of that verdict are at some holds of its hand, the safe wall was tried at all of them"
 _ALONE = "{0} without one, searched and attacked alike"
 # What is assumed, how much that costs, and what to measure.
 _ASSUMED = "{0}, neither measured nor published: the wall bears half and twice of {1}. {2}"
@@ -61,8 +66,9 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     """Returns the lines that a builder reads first, each with its name."""
     found, best = told.found, told.found.advised
     safe = _SAFE.format(format_stiffness(found.stiffness_N_m), best.family.phrase(best.values))
-    safe = ", ".join([safe, *told.provisos])
     lines = [("at most" if told.is_ideal else "safe up to", safe if found.stiffness_N_m else _NO_WALL)]
+    if found.stiffness_N_m and told.provisos:
+        lines.append(("its run", describe_run(told.provisos)))
     lines.append(("for a hand", describe_hand(told)))
     if found.as_assumed:
         lines.append(("assumes", assumes(told, found.as_assumed)))
@@ -116,6 +122,13 @@ def assumes(told: Advice, right: Best) -> str:
 def sentences(told: Advice) -> list[str]:
     """Returns headline and answer as lines of text."""
     return [told.headline, *(f"{name}: {words.rstrip('.')}." for name, words in answer(told))]
+
+
+def describe_run(provisos: Sequence[str]) -> str:
+    """Describes what the verdict of a run of the advised scene says beside its word."""
+    told = [proviso for proviso in provisos if proviso != _SOME_HOLDS]
+    adds = _ADDS.format(", ".join(told)) if told else ""
+    return "; ".join(filter(None, [adds, _PUSHED if _SOME_HOLDS in provisos else ""]))
 
 
 def describe_hand(told: Advice) -> str:
@@ -191,9 +204,17 @@ def _changes(told: Advice) -> Table:
     table = make_table("one change, or an ideal", *heads, numbers=heads)
     for row in (told.unchanged, *told.changed, *told.without):
         style = "bold" if max(row.factor, row.alone_factor) >= _TELLS else ""
-        numbers = (format_limit(row.limit), fixed(row.factor, 2), format_limit(row.alone), fixed(row.alone_factor, 2))
+        base = told.unchanged
+        times = [_factor(row.factor, row.limit, base.limit), _factor(row.alone_factor, row.alone, base.alone)]
+        numbers = (format_limit(row.limit), times[0], format_limit(row.alone), times[1])
         table.add_row(row.words, *numbers[: len(heads)], style=style)
     return table
+
+
+def _factor(factor: float, limit: Limit, base: Limit) -> str:
+    """Formats a factor; "same" where it may be 1, as closely as both limits are known."""
+    is_same = limit.stiffness_N_m <= base.fails_N_m and base.stiffness_N_m <= limit.fails_N_m
+    return "same" if is_same else fixed(factor, 2)
 
 
 def _assumed(told: Advice) -> Table:
@@ -214,8 +235,11 @@ def format_stiffness(stiffness_N_m: float, digits: int = 3) -> str:
 
 
 def format_limit(limit: Limit) -> str:
-    """Formats a limit, known to two digits: ``none`` where no wall bears it, ``over ...`` where no end was found."""
+    """Formats a limit, known to two digits: ``over ...`` where no end was found.
+
+    It is ``below ...`` where no wall so soft was tried that bears it, and ``none`` where no wall at all does.
+    """
     if not limit.stiffness_N_m:
-        return "none"
+        return f"below {format_stiffness(limit.fails_N_m, 2)}" if limit.fails_N_m > LEAST_N_M else "none"
     over = "over " if not math.isfinite(limit.fails_N_m) else ""
     return over + format_stiffness(limit.stiffness_N_m, 2)

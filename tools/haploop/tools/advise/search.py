@@ -40,6 +40,16 @@ from haploop.tools.advise.withstand import (
 # Parameters that are tried in every corner, by their places among those that bear as much in the loop as described;
 # what suits a device of half the mass is smaller.
 _MANY, _WIDE, _ONE = (0.0, 0.5, 1.0), (-1.0, 0.0, 1.0), (0.5,)
+# What is told while it goes on, the last by the advice.
+STAGES = (
+    "the wall alone",
+    "one element",
+    "two elements",
+    "every other element",
+    "every corner",
+    "softer walls and the attack",
+    "changes of the device",
+)
 # So many of the corners that are hardest on the wall alone take part in that.
 _HARDEST = 6
 # So many of each wall's hardest tell what a change would gain.

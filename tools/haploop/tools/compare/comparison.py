@@ -118,7 +118,7 @@ def compare(
     alone_N_m = _each(alone, loops, kept, executor, stage, "walls without any element", float)
     main, *others = loops
     families = [family for family in STABILIZERS if plays(family, loops[main], alone_N_m[main])]
-    for names, of in (([main], effort), (others, beside)):
+    for names, of in (([main], effort), *([(others, beside)] if others else [])):
         jobs = {
             (name, family.name): Job(
                 loops[name], family.name, alone_N_m[name], _starts(found.get((main, family.name))), of
@@ -163,7 +163,9 @@ def _each(
     """Calls on each item that nothing is kept of, and returns the answers by name; they are kept as they come."""
     keys = {name: key_of(call.__name__, item) for name, item in items.items()}
     new = {keys[name]: item for name, item in items.items() if kept.get(keys[name]) is None}
-    advance = stage(words, len(new))
+    advance = stage(words, len(items))
+    for _ in range(len(items) - len(new)):
+        advance()
     under_way: dict[Future[Any], str] = {}
     while new or under_way:
         while new and len(under_way) < executor.count:

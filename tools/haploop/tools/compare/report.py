@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -173,6 +174,13 @@ def _others(loops: Sequence[OfLoop]) -> Table:
     return table
 
 
+def element_data(row: Row) -> dict[str, Any]:
+    """Returns an element as data: its name, what it holds, N/m, mean over the seeds, and its parameters in SI units."""
+    sizes = zip(family_of(row.family).parts, row.values, strict=True)
+    parameters = {f"{kind}.{key}": value for (kind, key), value in sizes}
+    return {"element": row.family, "held_N_m": held(row).value, "parameters": parameters}
+
+
 def comparison_data(told: Comparison) -> dict[str, object]:
     """Returns the comparison as one JSON object, the sentences first."""
     first = told.loops[0]
@@ -182,4 +190,5 @@ def comparison_data(told: Comparison) -> dict[str, object]:
         "reproduced": sorted(order.reproduced),
         "other_way": sorted(order.contradicted),
     }
-    return {"most": most_sentence(first), "again": again_sentence(first), "apart": pairs, **asdict(told)}
+    said = {"most": most_sentence(first), "again": again_sentence(first)}
+    return {"recommended": element_data(choice(first)), **said, "apart": pairs, **asdict(told)}

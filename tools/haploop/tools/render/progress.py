@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 # Names a stage of so many parts; what it returns is called after each of them.
 Stage = Callable[[str, int], Callable[[], None]]
 _REFRESH_S = 0.1
+# Lines of a stage where there is no terminal.
+_LINES = 10
 # Columns that all but the bar need, and the bar's bounds.
 _WORDS, _LEAST_BAR, _MOST_BAR = 70, 4, 24
 
@@ -102,7 +104,7 @@ def silent(_name: str, _count: int) -> Callable[[], None]:
 
 @contextmanager
 def bars() -> Iterator[Stage]:
-    """Shows a bar a stage on a terminal's stderr, and a line a stage elsewhere.
+    """Shows a bar a stage on a terminal's stderr, and lines elsewhere: ``NAME: 3 of 10``, ten a stage at most.
 
     They move after each part only: a thread that drew meanwhile would disturb what is measured.
     """
@@ -115,14 +117,20 @@ def bars() -> Iterator[Stage]:
     with progress.Progress("{task.description}", *columns, **look) as drawn:
 
         def stage(name: str, count: int) -> Callable[[], None]:
-            if not shown:
-                print(f"{name}: {count}", file=sys.stderr)
-            task = drawn.add_task(name, total=count)
-            drawn.refresh()
+            done, task = 0, drawn.add_task(name, total=count)
+
+            def tell() -> None:
+                if not shown and done * _LINES // max(count, 1) > (done - 1) * _LINES // max(count, 1):
+                    print(f"{name}: {done} of {count}", file=sys.stderr)
+                drawn.refresh()
 
             def advance() -> None:
+                nonlocal done
+                done += 1
                 drawn.advance(task)
-                drawn.refresh()
+                tell()
+
+            tell()
 
             return advance
 

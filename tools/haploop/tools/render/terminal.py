@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from rich.console import Console, RenderableType
     from rich.table import Table
     from rich.text import Text
 
@@ -31,6 +32,15 @@ def console(stderr: bool = False) -> Console:
     if not made.is_terminal:
         made.width = _WIDTH_OF_A_PIPE
     return made
+
+
+def as_text(shown: RenderableType) -> str:
+    """Returns what a terminal would show, without colours and as wide as in a pipe."""
+    from rich.console import Console
+
+    written = io.StringIO()
+    Console(file=written, width=_WIDTH_OF_A_PIPE, highlight=False, color_system=None).print(shown)
+    return written.getvalue().rstrip()
 
 
 def seen(verdict: str) -> str:

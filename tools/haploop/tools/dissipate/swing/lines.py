@@ -26,6 +26,8 @@ BLURRED_HZ = 0.3 * FAST.resolved_Hz
 
 def swing(x_m: Floats, rate_Hz: float, band: Band = FAST) -> Line | None:
     """Returns the swing of a window that has a frequency of the band, is wider than the counts are, and felt."""
+    if len(x_m) <= 3 * band.drift:
+        return None
     t = np.linspace(-1.0, 1.0, len(x_m))
     flat = x_m - np.polyval(np.polyfit(t, x_m, band.drift), t)
     line = main_line(flat, rate_Hz, band.above_Hz)
