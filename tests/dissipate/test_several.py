@@ -151,3 +151,14 @@ def test_a_swing_just_slower_than_a_buzz_is_told_beside_a_wider_and_slower_one(
     assert "a hand's own motion, its tremor or a slow limit cycle, which a recording alone cannot tell apart" in words
     assert "Its widest swing is at 0.70" in words
     assert "It swings at" not in said(tmp_path, sine(0.7, 1e-3))
+
+
+def test_motion_without_a_frequency_is_told_with_its_size_where_it_is_felt_and_beyond_the_noise(tmp_path: Path) -> None:
+    draw = np.random.default_rng(3)
+    phase = 2.0 * np.pi * np.cumsum(45.0 + 20.0 * np.sin(2.0 * np.pi * 4.0 * S + draw.uniform(0.0, 6.0))) * 1e-3
+    wandering = finder(5e-4 * np.sin(phase))
+    assert wandering.word() == "none seen"
+    assert wandering.fast_rms_m() == pytest.approx(5e-4 / np.sqrt(2.0), rel=0.05)
+    assert "Without a frequency it moves by 35" in said(tmp_path, 5e-4 * np.sin(phase))
+    for x_m in (COUNT_M * draw.standard_normal(len(S)), sine(0.7, 1e-2), sine(14.0, 6e-4)):
+        assert "Without a frequency" not in said(tmp_path, x_m)

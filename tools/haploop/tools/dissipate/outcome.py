@@ -153,6 +153,7 @@ class Outcome:
         tried: where no element was named, those at hand at sizes of equal largest force, ``EQUAL_N``, best first.
         left_out: a line that was taken for the shape of a slower motion, where no buzz was seen.
         several: swings at several frequencies at once, where there was no buzz at one.
+        fast_rms_m: by how much it moves above 15 Hz, r.m.s., for a second or more.
         slower: a swing at one frequency from some 3 Hz up to that of a buzz, where no buzz was seen.
     """
 
@@ -168,6 +169,7 @@ class Outcome:
     left_out: Overtone | None = None
     several: Several | None = None
     slower: Buzz | None = None
+    fast_rms_m: float = 0.0
     tried: tuple[ElementOutcome, ...] = ()
 
     @property
@@ -208,6 +210,7 @@ class Outcome:
             "buzz": _buzz_data(self.buzz),
             "several": self.several and self.several._asdict(),
             "slower": _buzz_data(self.slower),
+            "fast_rms_m": self.fast_rms_m,
             "left_out": self.left_out and self.left_out.line._asdict() | {"slower_Hz": self.left_out.slower_Hz},
             "main_Hz": self.main_Hz,
             "samples": notes.pop("rows"),
@@ -280,6 +283,7 @@ def make_outcome(
         None if buzz or several else found.overtone(),
         several,
         None if buzz or several or not found.slower else found.slower.buzz(),
+        found.fast_rms_m(),
     )
 
 

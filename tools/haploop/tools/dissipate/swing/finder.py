@@ -20,7 +20,7 @@ from haploop.tools.dissipate.swing.buzz import (
     Word,
 )
 from haploop.tools.dissipate.swing.fed import fed_W
-from haploop.tools.dissipate.swing.lines import Slower, is_overtone, overtone_of, swing
+from haploop.tools.dissipate.swing.lines import Slower, fast_rms_m, is_overtone, overtone_of, swing
 from haploop.tools.dissipate.swing.several import SeveralFinder
 from haploop.view.look.spectrum import Line, main_line
 
@@ -84,6 +84,8 @@ class BuzzFinder:
         # Samples since the last gap, bridged or not.
         self._whole = 0
         self._left_out: list[Overtone] = []
+        # Of every window, what is faster than the band's least frequency, r.m.s., m; 0 between parts.
+        self._fast_m: list[float] = []
 
     def add(self, piece: Samples) -> None:
         """Takes a piece; its times tell a rate that its period is only about."""
@@ -98,6 +100,7 @@ class BuzzFinder:
             self._begins_s = float(piece.t_s[0])
             self._stretches.append([])
             self._several.part()
+            self._fast_m.append(0.0)
         line = main_line(piece.x_m, self.rate_Hz)
         if line and line.frequency_Hz < self._band.above_Hz and (self.slow is None or line.width > self.slow.width):
             self.slow = line
@@ -131,6 +134,7 @@ class BuzzFinder:
         rate_Hz = (len(t_s) - 1) / (to_s - from_s)
         line = swing(x_m, rate_Hz, self._band)
         if self._band is FAST:
+            self._fast_m.append(fast_rms_m(x_m, rate_Hz))
             self._several.look(from_s if from_s == self._begins_s else from_s + inside_s, to_s - inside_s, x_m, rate_Hz)
         if line and (slower := overtone_of(line, x_m, rate_Hz, self._band)):
             self._left_out.append(Overtone(line, slower.frequency_Hz))
@@ -235,6 +239,11 @@ class BuzzFinder:
     def several(self) -> Several | None:
         """Returns the swings at several frequencies at once; None where there were none that last."""
         return self._several.found(self._slower())[0]
+
+    def fast_rms_m(self) -> float:
+        """Returns by how much it moves above 15 Hz, r.m.s., at least in every window of a second; 0 of less."""
+        rows = [min(self._fast_m[at : at + _NEEDED + 1]) for at in range(len(self._fast_m) - _NEEDED)]
+        return max(rows, default=0.0)
 
     def overtone(self) -> Overtone | None:
         """Returns the widest line that lasted and was left out for an overtone; None where there was none."""

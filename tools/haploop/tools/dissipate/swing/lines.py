@@ -42,6 +42,14 @@ def _counts_m(x_m: Floats) -> float:
     return _COUNTS * float(np.percentile(steps[steps > 0.0], _SMALLEST)) if steps.any() else 0.0
 
 
+def fast_rms_m(x_m: Floats, rate_Hz: float) -> float:
+    """Returns the root mean square of what is faster than a hand's motion, under the window of Hann of the spectrum."""
+    at, height = amplitudes(x_m, rate_Hz)
+    # A line of the height h has a variance of h^2 / 2, and that window spreads it over lines with 1.5 times as much; a
+    # slower motion reaches two lines further.
+    return float(np.sqrt((height[at > FAST.above_Hz + 2.0 * FAST.resolved_Hz] ** 2).sum() / 3.0))
+
+
 def swings(x_m: Floats, rate_Hz: float) -> tuple[Line, ...]:
     """Returns the swings of a window at several frequencies at once, from slow to fast; empty where there are none.
 

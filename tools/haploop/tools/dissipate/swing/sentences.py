@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+from haploop.launch.stability.traces import is_felt
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.dissipate.swing.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, SLOWER, Buzz, Span, Word
 from haploop.tools.dissipate.swing.fed import LEAST_FED
@@ -18,7 +20,7 @@ _BUZZ: dict[Word, str] = {
     ),
     "none seen": (
         "No{other} swing above {above:g} Hz was seen, at one frequency or up to three at once, that lasts {lasts:g} s "
-        "and is wide enough to be felt. Motion without a frequency is not looked for."
+        "and is wide enough to be felt. Motion without a frequency is not called a buzz."
     ),
     "cannot say": (
         "Whether the recording buzzes cannot be said: that takes {lasts:g} s without a gap, and {rate:g} samples a "
@@ -49,6 +51,12 @@ _SLOWER = (
     " It swings at {frequency}, {width} peak to peak at most, {when}: slower than the {above:g} Hz from which on it is "
     "called a buzz; a hand's own motion, its tremor or a slow limit cycle, which a recording alone cannot tell apart."
 )
+_FAST = (
+    " Without a frequency it moves by {rms} r.m.s. above {above:g} Hz for a second or more: so do a hand's fast "
+    "motion, blows and noise, but an irregular buzz, too."
+)
+# So many times the noise of single positions.
+_BEYOND_NOISE = 3.0
 _HAND = " Its widest swing is at {main:.3g} Hz, {width} peak to peak at most, which a hand can, too."
 NEXT = (
     "Which wall and which element suit the device: describe it in a file (haploop scenes premium15 prints one to start "
@@ -94,6 +102,10 @@ def buzz_sentence(outcome: Outcome) -> str:
         return words + _course(outcome.buzz) + _fed(outcome.buzz, sign_is_known)
     if several:
         return words + _NOT_FED * bool(outcome.force)
+    rms_m = outcome.fast_rms_m
+    is_beyond_noise = rms_m > _BEYOND_NOISE * (outcome.noise_m or 0.0)
+    if outcome.buzz_word == "none seen" and is_beyond_noise and is_felt(2.0 * math.sqrt(2.0) * rms_m, ABOVE_HZ):
+        words += _FAST.format(rms=amount(rms_m, "m"), **limits)
     if outcome.slower:
         words += _SLOWER.format(**limits | _told(outcome.slower))
     if (slow := outcome.slow) and not (outcome.slower and slow.frequency_Hz > SLOWER.above_Hz):
