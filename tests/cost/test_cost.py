@@ -127,7 +127,7 @@ def test_the_command_measures_prints_and_then_only_prints(smooth, tmp_path):
     command = ["cost", str(smooth), *options, "--out", str(tmp_path / "out")]
     first, again = (CliRunner().invoke(app, command) for _ in range(2))
     assert first.exit_code == again.exit_code == 0, first.output
-    assert "smooth: errors: 4" in first.stderr
+    assert "smooth: errors: 4 of 4" in first.stderr
     assert "errors" not in again.stderr
     assert first.stdout == again.stdout
     assert "smooth: Cheapest within 1.00 µm of the reference: exact at" in first.stdout
