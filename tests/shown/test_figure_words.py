@@ -110,6 +110,7 @@ def test_the_loop_of_a_run_that_never_touches_its_wall_says_so_and_has_no_legend
     assert ax.get_legend() is None
 
 
+@pytest.mark.slow
 def test_dollars_in_names_and_titles_are_drawn_as_they_are_written(tmp_path: Path) -> None:
     for name in ("$\\foo$", "stiff $x_1$"):
         of = [f'title="{name}"'.replace("\\", "\\\\"), "duration=0.1", 'run.verdict="window"']
