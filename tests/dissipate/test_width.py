@@ -75,6 +75,7 @@ def test_the_power_given_to_a_swing_counts_the_overtones_that_shape_it() -> None
     assert found(t, x, -K_N_M * x).fed_W == pytest.approx(power_W, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_buzz_in_a_run_and_in_its_positions_as_text_is_as_wide_as_the_device_swings(tmp_path: Path) -> None:
     layers = read_layers(bundled("scenes")["demo"])
     layers.data.pop("event")
