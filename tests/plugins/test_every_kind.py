@@ -25,7 +25,7 @@ from haploop.protocol.register import UnknownKind
 from haploop.protocol.scene.hand_force import HandForce
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.walls.registry import make_wall, wall_class
-from haploop.tools.cli.options import bring_files
+from haploop.tools.cli.scenes import kinds_with
 from haploop.tools.executor.pool import Pool
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.run_figure import draw, make_figure
@@ -172,7 +172,7 @@ def test_the_ideal_wall_of_a_run_is_drawn_where_its_file_is_given_again(tmp_path
         return bool(figure.findobj(lambda artist: artist.get_gid() == "spring"))
 
     before = is_drawn()
-    bring_files([tmp_path / "own.py"])
+    kinds_with([tmp_path / "own.py"])
     assert (before, is_drawn()) == (False, True)
 
 

@@ -1,4 +1,4 @@
-"""What advise and compare return: the answer by name, the report of the command as text."""
+"""Results of advise and compare: the answer by name, the report of the command as text."""
 
 from __future__ import annotations
 

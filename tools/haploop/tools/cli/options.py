@@ -165,14 +165,6 @@ def print_json(data: Any) -> None:
     print(json.dumps(finite(data)), flush=True)
 
 
-def bring_files(plugins: list[Path]) -> None:
-    """Makes known what some plugin files bring; PluginError where one brings nothing usable."""
-    if plugins:
-        from haploop.controller.dissipation import registry
-
-        registry(plugins)
-
-
 @contextlib.contextmanager
 def plain_errors() -> Iterator[None]:
     """Turns the errors of the packages below into messages: 2 for wrong use, 1 for a run that failed."""

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from haploop.tools.cli.options import WRONG_USE, Directory, Json, Plugin, bring_files, leave, plain_errors, print_json
+from haploop.tools.cli.options import WRONG_USE, Directory, Json, Plugin, leave, plain_errors, print_json
+from haploop.tools.cli.scenes import kinds_with
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -55,7 +56,8 @@ def plot(
     from haploop.tools.figure.data import FigureError
 
     with plain_errors():
-        bring_files(plugin or [])
+        if plugin:
+            kinds_with(plugin)
         try:
             target = draw_any(directory, out)
         except FigureError as error:

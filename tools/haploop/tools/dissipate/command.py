@@ -19,12 +19,13 @@ from haploop.tools.cli.options import FAILED, WRONG_USE, leave, parse_assignment
 from haploop.tools.cli.scenes import kinds_with
 from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.figure import make_figure
-from haploop.tools.dissipate.outcome import Outcome, Recording, Trace, make_outcome, make_tried
+from haploop.tools.dissipate.outcome import Outcome, Recording, make_outcome, make_tried
 from haploop.tools.dissipate.recording.position_noise import PositionNoise
 from haploop.tools.dissipate.recording.samples import LogRecording, RecordingError, read_scene
 from haploop.tools.dissipate.recording.text_recording import Layout, TextRecording
 from haploop.tools.dissipate.report import make_report
 from haploop.tools.dissipate.swing.finder import BuzzFinder
+from haploop.tools.dissipate.trace import Trace
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.terminal import console

@@ -1,4 +1,4 @@
-"""The outcome: numbers of every element, notes on the recording, and a trace of the books for a figure."""
+"""The outcome: numbers of every element, and notes on the recording."""
 
 from __future__ import annotations
 
@@ -10,81 +10,24 @@ import numpy as np
 
 from haploop.controller.dissipation import Element, Quantity
 from haploop.protocol.scene.scene import ElementTable, Scene
-from haploop.tools.dissipate.booking import Booked, Booking
+from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.force_book import Passivity
 from haploop.tools.dissipate.recording.samples import Floats, LogRecording
 from haploop.tools.dissipate.recording.text_recording import TextRecording
 from haploop.tools.dissipate.swing.buzz import Buzz, Overtone, Several, Word
 from haploop.tools.dissipate.swing.finder import BuzzFinder
+from haploop.tools.dissipate.trace import Trace
 from haploop.tools.render.units import amount
 from haploop.view.look.spectrum import Line
-from haploop.view.store.lod_level import extremes
 
 # Both have a name, the control period and the delay of the forces in s, ``between``: what the motion between samples is
 # taken from, ``recorded``: which of "velocity" and "acceleration" are not estimated, ``has_force``, and notes, complete
 # once all samples have been read.
 Recording = LogRecording | TextRecording
-# Points above which the trace is decimated.
-_MOST = 8192
-# Length of the detail, s.
-_CLOSE_S = 0.1
 # Where no element is named those at hand are tried at sizes of this largest force.
 EQUAL_N = 0.1
 # The terms of a sum that cancel leave so much of them.
 _ROUNDING = 1e-12
-
-
-class Trace:
-    """Keeps the books of a recording of any length in bounded memory, decimated with their extremes kept.
-
-    Args:
-        rows: of ``lines``: t, x, sampled and true books of every element, rows of a recorded force.
-
-    Attributes:
-        close: in full, the interval in which most was given back, rows like those of ``lines``; None before any was.
-    """
-
-    def __init__(self, period_s: float, rows: int) -> None:
-        self._span = max(8, round(_CLOSE_S / period_s))
-        self._group, self._points, self._left = 1, np.empty((rows, 0)), np.empty((rows, 0))
-        self._open = np.empty((rows + 1, 0))
-        self._most_given_J = 0.0
-        self.close: Floats | None = None
-
-    def add(self, booked: Booked) -> None:
-        rows = np.vstack([booked.t_s, booked.x_m, booked.sampled_J, booked.true_J, *(booked.force or ())])
-        self._keep(rows)
-        self._look_closely(np.vstack([rows, -np.minimum(booked.added_J, 0.0).sum(axis=0)]))
-
-    def lines(self) -> Floats:
-        """Returns the rows over the whole recording; shape (rows, points)."""
-        return np.hstack([self._points, self._left])
-
-    def _keep(self, rows: Floats) -> None:
-        left = np.hstack([self._left, rows])
-        whole = left.shape[1] - left.shape[1] % self._group
-        done = left[:, :whole] if self._group == 1 else extremes(left[:, :whole], self._group)
-        self._left, self._points = left[:, whole:], np.hstack([self._points, done])
-        while self._points.shape[1] > _MOST:
-            # What is left of a group of four are the newest points; they stay as they are.
-            usable = self._points.shape[1] // 4 * 4
-            self._points = np.hstack([extremes(self._points[:, :usable], 4), self._points[:, usable:]])
-            self._group = max(4, 2 * self._group)
-
-    def _look_closely(self, tagged: Floats) -> None:
-        """Compares intervals of equal length that overlap by half, by what was given back, in the last row."""
-        waiting = np.hstack([self._open, tagged])
-        while waiting.shape[1] >= self._span:
-            self._consider(waiting[:, : self._span])
-            waiting = waiting[:, self._span // 2 :]
-        self._open = waiting
-        if self.close is None and waiting.shape[1]:
-            self._consider(waiting)
-
-    def _consider(self, stretch: Floats) -> None:
-        given = float(stretch[-1].sum())
-        if given > self._most_given_J:
-            self._most_given_J, self.close = given, stretch[:-1].copy()
 
 
 @dataclass(frozen=True)
