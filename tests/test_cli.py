@@ -156,6 +156,14 @@ def test_help_imports_none_of_the_heavy_packages():
     assert not {"numpy", "scipy", "pydantic", "pint", "zmq", "msgpack", "matplotlib", "mcap"} & set(loaded)
 
 
+def test_the_launcher_of_a_run_waits_for_no_numpy():
+    """Its processes wait for it: what only the verdict after the run needs is imported then."""
+    code = "import sys, haploop.launch.processes.supervisor, haploop.launch.runs.start; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
+    assert "haploop.launch.scene.models" in loaded
+    assert not {"numpy", "scipy", "pint", "mcap"} & set(loaded)
+
+
 def test_version_and_both_forms_of_help_are_answered():
     assert haploop("--version").stdout == f"haploop {version('haploop')}\n"
     assert haploop("run", "-h").stdout == haploop("run", "--help").stdout

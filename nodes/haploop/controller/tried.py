@@ -12,8 +12,8 @@ import numpy as np
 
 from haploop.controller.estimators.base import Estimator
 from haploop.controller.estimators.choose import make_estimators
-from haploop.protocol.installed import brought
 from haploop.protocol.plugin_file import PluginError, raised_in_file
+from haploop.protocol.scene.brought import is_of_file
 from haploop.protocol.scene.hand_force import HandForce
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -23,17 +23,6 @@ from haploop.protocol.walls.wall import Wall
 # So long may each be at work, where it can be interrupted: in the main thread.
 _LIMIT_S = 2.0
 _DEPTHS_M, _TIMES_S = (0.0, 1e-4), (0.0, 0.5, 3.0)
-
-
-def is_of_file(group: str, name: str | None) -> bool:
-    """Tells whether a scene's name is that of a class that a plugin file has brought into this process."""
-    return name is not None and name in brought(group)
-
-
-def names_of_files(scene: Scene) -> bool:
-    """Tells whether a scene names a wall or a hand force of a plugin file, which plant or logger need."""
-    force = scene.hand and scene.hand.force
-    return is_of_file(Wall.group, scene.wall and scene.wall.kind) or is_of_file(HandForce.group, force and force.kind)
 
 
 def try_kinds(scene: Scene) -> None:

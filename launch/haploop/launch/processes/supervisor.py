@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import zmq
 
 from haploop.controller.dissipation.registry import installed
-from haploop.controller.tried import names_of_files
 from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.commands import Commands
 from haploop.launch.clock.device_time import PLANT, lateness_told
@@ -28,6 +27,7 @@ from haploop.launch.processes.foreign import Program
 from haploop.launch.processes.shown_prints import PRINTS, ShownPrints
 from haploop.launch.spec import OutputError, RunFailed, RunSpec
 from haploop.protocol.changes import Event
+from haploop.protocol.scene.brought import names_of_files
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.machine import Machine, machine_of
 from haploop.protocol.transport.sockets import SecureContext, Transport, with_host_of
