@@ -17,7 +17,7 @@ from haploop.tools.dissipate.recording.stamps import Flags
 from haploop.tools.dissipate.report import make_report, note_sentences
 from haploop.tools.dissipate.swing.finder import BuzzFinder
 from helpers.data.recordings import outcome, write
-from helpers.shown import shown
+from helpers.shown import artists, shown
 
 S: Floats = np.arange(4000.0) * 1e-3
 COUNT_M = 11e-6
@@ -273,8 +273,21 @@ def test_the_buzz_is_the_first_thing_said_also_without_an_element(recording: Pat
     assert "what each element at hand would have taken" in result.stdout
     assert result.stdout.index("damping") < result.stdout.index("--damping 2.7")
     data = json.loads(CliRunner().invoke(app, ["dissipate", str(recording), "--json"]).stdout)
-    assert (data["buzz_word"], data["elements"], data["figure"]) == ("buzzes", [], None)
+    assert (data["buzz_word"], data["elements"]) == ("buzzes", [])
+    assert Path(data["figure"]).stat().st_size > 20_000
     assert data["buzz"]["frequency_Hz"] == pytest.approx(31.0, abs=1.0) == data["main_Hz"]
+
+
+@pytest.mark.parametrize("dampings", [[], ["2"]])
+def test_the_figure_marks_when_and_at_how_many_hertz_it_buzzes(tmp_path: Path, dampings: list[str]) -> None:
+    x = swing(45.0, 3e-4) * (S < 1.5) + swing(110.0, 2e-4) * (S > 2.5)
+    figure = make_figure(outcome(write(tmp_path / "turns.csv", {"t": S, "x": x}), dampings=dampings))
+    bars = [(bar.get_x(), bar.get_x() + bar.get_width()) for bar in artists(figure, "buzz")]
+    assert bars == [pytest.approx((0.0, 1.5), abs=0.2), pytest.approx((2.5, 4.0), abs=0.2)]
+    hertz = [float(text.get_text().removesuffix(" Hz")) for text in artists(figure, "hertz")]
+    assert hertz == pytest.approx([45.0, 110.0], abs=0.2)
+    still = make_figure(outcome(write(tmp_path / "still.csv", {"t": S, "x": swing(8.0, 1e-3)}), dampings=dampings))
+    assert not artists(still, "buzz")
 
 
 def test_a_swing_as_slow_as_a_hands_is_told_as_what_it_is(tmp_path: Path) -> None:

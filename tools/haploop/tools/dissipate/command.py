@@ -97,7 +97,7 @@ def dissipate(request: Request, as_json: bool) -> None:
             outcome = compute_outcome(request, kinds_with(request.plugins))
         except (RecordingError, FileNotFoundError) as error:
             leave(str(error), WRONG_USE)
-    figure = _draw(outcome, request) if outcome.elements or outcome.force else None
+    figure = _draw(outcome, request)
     if as_json:
         print_json(outcome.as_data() | {"figure": str(figure) if figure else None})
         return

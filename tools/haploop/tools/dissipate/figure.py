@@ -10,12 +10,13 @@ import numpy as np
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.dissipate.report import buzz_sentence, conclusion, make_row, note_sentences, rows, uneven
+from haploop.tools.dissipate.swing.sentences import MOST_SPANS, buzzing
 from haploop.tools.figure import style
 from haploop.tools.render.units import prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
 _COLUMNS = ("", "true", "sampled", "took", "gave back", "largest force")
 _AT = (0.04, 0.46, 0.585, 0.71, 0.835, 1.0)
@@ -29,12 +30,31 @@ _CORNER: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.0, 1.0), "n
 
 
 def make_figure(outcome: Outcome) -> Figure:
-    """Draws motion and energies, whole and in detail, the table, and notes; FigureError where matplotlib is missing."""
+    """Draws motion and energies, whole and in detail, the table, and notes; FigureError where matplotlib is missing.
+
+    Where neither an element nor a force was named there are no energies: it draws the motion alone.
+    """
     words, answer = _words(outcome), _answer(outcome)
     above_in, below_in = 0.4 + _ANSWER_IN * len(answer), _LINE_IN * len(words)
-    figure = style.empty_figure(13.0, above_in + 7.2 + below_in)
-    parts = figure.subfigures(3, 1, squeeze=False, height_ratios=(above_in, 7.2, below_in))[:, 0]
+    body_in = 7.2 if outcome.elements or outcome.force else 3.6
+    figure = style.empty_figure(13.0, above_in + body_in + below_in)
+    parts = figure.subfigures(3, 1, squeeze=False, height_ratios=(above_in, body_in, below_in))[:, 0]
     header, body, below = parts
+    if outcome.elements or outcome.force:
+        _draw_energies(body, outcome)
+    else:
+        _motion(body.add_subplot(), outcome, outcome.trace.lines(), "Recorded motion", whole=True)
+    look = {"fontsize": style.SMALL, "color": style.GREY}
+    below.text(0.008, 1.0, "\n".join(words), va="top", gid="words", **look)
+    title = {"fontsize": style.LARGE, "color": style.INK, "va": "center", "gid": "title"}
+    header.text(0.008, 1.0 - 0.2 / above_in, outcome.recording.name, **title)
+    told = {"fontsize": style.TEXT + 1, "color": style.INK, "va": "top", "linespacing": 1.4, "gid": "answer"}
+    header.text(0.008, 1.0 - 0.42 / above_in, "\n".join(answer), **told)
+    body.align_ylabels()
+    return figure
+
+
+def _draw_energies(body: SubFigure, outcome: Outcome) -> None:
     lines, close = outcome.trace.lines(), outcome.trace.close
     lines_of_table = 1 + min(len(rows(outcome)), _MOST)
     heights = (0.8, 1.6, max(0.14 * lines_of_table, 0.55))
@@ -62,18 +82,10 @@ def make_figure(outcome: Outcome) -> Figure:
         for ax in near:
             style.few_ticks(ax)
     _table(body.add_subplot(grid[2, :]), outcome, lines_of_table)
-    look = {"fontsize": style.SMALL, "color": style.GREY}
-    below.text(0.008, 1.0, "\n".join(words), va="top", gid="words", **look)
-    title = {"fontsize": style.LARGE, "color": style.INK, "va": "center", "gid": "title"}
-    header.text(0.008, 1.0 - 0.2 / above_in, outcome.recording.name, **title)
-    told = {"fontsize": style.TEXT + 1, "color": style.INK, "va": "top", "linespacing": 1.4, "gid": "answer"}
-    header.text(0.008, 1.0 - 0.42 / above_in, "\n".join(answer), **told)
-    body.align_ylabels()
-    return figure
 
 
 def _motion(ax: Axes, outcome: Outcome, lines: Floats, title: str, whole: bool) -> None:
-    """Draws position over time, with the wall as far as it is in view; the whole view reaches to it."""
+    """Draws position over time, with the wall as far as it is in view; the ``whole`` of it to the wall, with buzzes."""
     factor, letter = prefix_for([float(np.abs(lines[1]).max())])
     t, x = lines[0], lines[1] / factor
     low, high = float(x.min()), float(x.max())
@@ -88,8 +100,26 @@ def _motion(ax: Axes, outcome: Outcome, lines: Floats, title: str, whole: bool) 
         ax.axhline(surface, color=style.WALL, linewidth=1.0, zorder=1)
     ax.plot(t, x, color=style.INK, linewidth=1.0, gid="position")
     ax.set_ylim(low - margin, high + margin)
+    if whole:
+        _buzzes(ax, outcome)
     _common(ax, outcome, t)
     style.dress(ax, title, "time (s)", f"position ({letter}m)")
+
+
+def _buzzes(ax: Axes, outcome: Outcome) -> None:
+    """Draws a bar above each stretch in which the recording buzzes, with its frequencies."""
+    look: dict[str, Any] = {
+        "ha": "center",
+        "va": "bottom",
+        "fontsize": style.SMALL,
+        "color": style.BUZZ,
+        "gid": "hertz",
+    }
+    stretches = buzzing(outcome)
+    for from_s, to_s, frequency in stretches:
+        ax.axvspan(from_s, to_s, ymin=0.96, color=style.BUZZ, linewidth=0, gid="buzz")
+        if len(stretches) <= MOST_SPANS:
+            ax.text(0.5 * (from_s + to_s), 1.0, frequency, transform=ax.get_xaxis_transform(), **look)
 
 
 def _energies(ax: Axes, outcome: Outcome, lines: Floats, title: str) -> None:
@@ -169,8 +199,10 @@ def _words(outcome: Outcome) -> list[str]:
 
 def _answer(outcome: Outcome) -> list[str]:
     """Returns the lines above the figure: whether the recording buzzes, and what the elements would have done."""
+    first = [line for each in (*uneven(outcome), buzz_sentence(outcome)) for line in textwrap.wrap(each, _LINE_LETTERS)]
+    if not (outcome.elements or outcome.force):
+        return first
     sentence = conclusion(outcome)
     words = f"{sentence[:1].upper()}{sentence[1:]}"
     room = {"max_lines": _MOST_ANSWER_LINES - 1, "placeholder": " …"}
-    first = [line for each in (*uneven(outcome), buzz_sentence(outcome)) for line in textwrap.wrap(each, _LINE_LETTERS)]
     return [*first, *textwrap.wrap(words, _LINE_LETTERS, **room)]

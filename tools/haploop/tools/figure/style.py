@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from haploop.logger.summary import Summary
 
 INK, GREY, FAINT = "#222222", "#666666", "#BBBBBB"
-WALL, WALL_FILL, CLOSE = "#0072B2", "#D6E6F2", "#EBD9A8"
+WALL, WALL_FILL, CLOSE, BUZZ = "#0072B2", "#D6E6F2", "#EBD9A8", "#B35900"
 ELEMENTS = ("#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C564B")
 PRESSING, RELEASING, EARLY = "#332288", "#DDAA33", "#C8C8C8"
 # What the plant adds of its own: bodies beyond the device, forces beyond the commands.

@@ -29,7 +29,7 @@ _BUZZ: dict[Word, str] = {
 }
 _ONE_HZ, _MOVING_HZ = "{0:.1f} Hz (give or take {1:g} Hz)", "{0:.0f} to {1:.0f} Hz"
 # Of so many spans with frequencies of their own each is told.
-_MOST_SPANS = 4
+MOST_SPANS = 4
 _SPAN = "{frequency} ({width}) from about {from_s:.1f} s to {to_s:.1f} s"
 _LINE = "{0:.1f} Hz, {1}"
 _NOT_FED = " What a recorded force gives to a swing is told of one at one frequency alone."
@@ -116,6 +116,14 @@ def buzz_sentence(outcome: Outcome) -> str:
     return words + _LEFT_OUT.format(**numbers)
 
 
+def buzzing(outcome: Outcome) -> list[tuple[float, float, str]]:
+    """Returns each stretch in which the recording buzzes: from when to when, s, and its frequencies in words."""
+    if several := outcome.several:
+        return [(several.from_s, several.to_s, " and ".join(f"{at_Hz:.1f} Hz" for at_Hz, _ in several.lines))]
+    buzz = outcome.buzz
+    return [(span.from_s, span.to_s, _frequency(span, buzz)) for span in buzz.spans] if buzz else []
+
+
 def _told(buzz: Buzz) -> dict[str, str]:
     """Returns at which frequency it swings, how wide and when; spans with frequencies of their own by themselves."""
     moves = _moves(buzz.least_Hz, buzz.most_Hz, buzz)
@@ -123,7 +131,7 @@ def _told(buzz: Buzz) -> dict[str, str]:
     told = {"frequency": (_MOVING_HZ if moves else _ONE_HZ).format(*of_Hz), "width": amount(buzz.width_m, "m")}
     from_s, to_s = buzz.stretches[0][0], buzz.stretches[-1][1]
     times = len(buzz.spans)
-    if moves and 1 < times <= _MOST_SPANS:
+    if moves and 1 < times <= MOST_SPANS:
         return told | {"when": " and ".join(_span(span, buzz) for span in buzz.spans)}
     return told | {
         "when": _ONCE.format(from_s, to_s) if times == 1 else _AGAIN.format(times, from_s, to_s, buzz.lasts_s)
@@ -135,10 +143,17 @@ def _moves(least_Hz: float, most_Hz: float, buzz: Buzz) -> bool:
 
 
 def _span(span: Span, buzz: Buzz) -> str:
-    from_s, to_s, least_Hz, most_Hz, width_m = span
-    moves = _moves(least_Hz, most_Hz, buzz)
-    frequency = _MOVING_HZ.format(least_Hz, most_Hz) if moves else f"{0.5 * (least_Hz + most_Hz):.1f} Hz"
-    return _SPAN.format(frequency=frequency, width=amount(width_m, "m"), from_s=from_s, to_s=to_s)
+    told = {"frequency": _frequency(span, buzz), "width": amount(span.width_m, "m")}
+    return _SPAN.format(**told, from_s=span.from_s, to_s=span.to_s)
+
+
+def _frequency(span: Span, buzz: Buzz) -> str:
+    least_Hz, most_Hz = span.least_Hz, span.most_Hz
+    return (
+        _MOVING_HZ.format(least_Hz, most_Hz)
+        if _moves(least_Hz, most_Hz, buzz)
+        else f"{(least_Hz + most_Hz) / 2:.1f} Hz"
+    )
 
 
 def _course(buzz: Buzz) -> str:
