@@ -166,8 +166,7 @@ class BuzzFinder:
 
         Where one stretch lasts, shorter ones at its frequencies count, too, as long as they are as wide.
         """
-        slower = self._slower()
-        lasting = [kept for stretch in self._stretches if (kept := self._lasting(stretch, slower))]
+        lasting, _ = self._parted()
         if not lasting:
             return None
         kept = [window for stretch in lasting for window in stretch]
@@ -222,8 +221,14 @@ class BuzzFinder:
             found.append(Slower(line, 0.5 * (of.most_Hz - of.least_Hz)))
         return found
 
-    def _lasting(self, stretch: list[_Window], slower: list[Slower]) -> list[_Window]:
-        """Returns the part of a stretch that lasts without decaying; none where it is an overtone of the motion."""
+    def _parted(self) -> tuple[list[list[_Window]], list[Overtone]]:
+        """Returns of each stretch the part that lasts, and what was left out for an overtone of a slower motion."""
+        slower = self._slower()
+        parts = [self._lasting(stretch, slower) for stretch in self._stretches]
+        return [kept for kept, _ in parts if kept], [*self._left_out, *(one for _, left in parts for one in left)]
+
+    def _lasting(self, stretch: list[_Window], slower: list[Slower]) -> tuple[list[_Window], list[Overtone]]:
+        """Returns the part of a stretch that lasts without decaying; what is an overtone of the motion by itself."""
         widths = [window.line.width for window in stretch]
         decays = [widths[i + _NEEDED] < _KEPT * max(widths[i : i + _NEEDED]) for i in range(len(widths) - _NEEDED)]
         lasting = [i for i, of in enumerate(decays) if not of]
@@ -232,9 +237,8 @@ class BuzzFinder:
             frequency_Hz = float(np.median([window.line.frequency_Hz for window in kept]))
             width_m = max(window.line.width for window in kept)
             if of := next((of for of in slower if is_overtone(frequency_Hz, width_m, of)), None):
-                self._left_out += [Overtone(window.line, of.line.frequency_Hz) for window in kept]
-                return []
-        return _filled(kept)
+                return [], [Overtone(window.line, of.line.frequency_Hz) for window in kept]
+        return _filled(kept), []
 
     def several(self) -> Several | None:
         """Returns the swings at several frequencies at once; None where there were none that last."""
@@ -247,7 +251,8 @@ class BuzzFinder:
 
     def overtone(self) -> Overtone | None:
         """Returns the widest line that lasted and was left out for an overtone; None where there was none."""
-        lasted = self._left_out if len(self._left_out) > _NEEDED else []
+        _, left = self._parted()
+        lasted = left if len(left) > _NEEDED else []
         some = [*lasted, *self._several.found(self._slower())[1]]
         return max(some, key=lambda each: each.line.width, default=None)
 
