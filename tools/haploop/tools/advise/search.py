@@ -37,9 +37,6 @@ from haploop.tools.advise.withstand import (
     withstand,
 )  # fmt: skip
 
-# Parameters that are tried in every corner, by their places among those that bear as much in the loop as described;
-# what suits a device of half the mass is smaller.
-_MANY, _WIDE, _ONE = (0.0, 0.5, 1.0), (-1.0, 0.0, 1.0), (0.5,)
 # What is told while it goes on, the last by the advice.
 STAGES = (
     "the wall alone",
@@ -134,11 +131,11 @@ def search(
     of, measured = ranges(loop, assumed), ranges(loop)
     query = Query(loop, (), every_case(of, FIRST_HOLDS), ladder(near / 4.0, near, 1.6))
     worst = hardest(loop, trial, (), of, limits(trial, [query], ROUGH)[0].stiffness_N_m)[:_HARDEST]
-    cases, places = every_case(of, FIRST_HOLDS, worst), _MANY if of == measured else _WIDE
-    bests = _in_corners(loop, trial, known, cases, places, some)
+    bests = in_corners(loop, trial, known, every_case(of, FIRST_HOLDS, worst), some, worth_trying(known, some))
     as_assumed = None
     if of != measured:
-        as_assumed = advised(_in_corners(loop, trial, known, every_case(measured, FIRST_HOLDS), _ONE, some))
+        likely = [(best.family, best.values) for best in bests[1:] if best.safe]
+        as_assumed = advised(in_corners(loop, trial, known, every_case(measured, FIRST_HOLDS), some, likely))
     stage("softer walls and the attack")
     compared = rivals(bests, worst)
     won = withstand(loop, trial, compared, of)
@@ -176,23 +173,26 @@ def _values(known: dict[Choice, Limit], family: Family) -> list[Values]:
     return [values for other, values in known if other is family]
 
 
-def _is_half(some: Values, of: Values) -> bool:
-    """Tells whether all parameters are about half of others, or less."""
-    return bool(some) and all(small <= 0.55 * large for small, large in zip(some, of, strict=True))
+def worth_trying(known: dict[Choice, Limit], families: Sequence[Family]) -> list[Choice]:
+    """Returns the choices of some families that bear a tenth more than the wall alone in the loop as described.
+
+    All of them: what bears most there may bear nothing in a corner in which half of it bears twice the wall alone.
+    """
+    least_N_m = WORTH * known[NOTHING, ()].stiffness_N_m
+    return [choice for choice, limit in known.items() if choice[0] in families and limit.stiffness_N_m > least_N_m]
 
 
-def _in_corners(
+def in_corners(
     loop: Scene,
     trial: Trial,
     known: dict[Choice, Limit],
     cases: tuple[Case, ...],
-    places: Sequence[float],
     families: Sequence[Family],
+    candidates: Sequence[Choice],
 ) -> list[Best]:
-    """Returns the wall alone and the best of some families, with limits in all the cases.
+    """Returns the wall alone and the best of every family, of those among the candidates with limits in all the cases.
 
-    Of parameters that bear as much in the loop as described those at these places, from the smallest, 0, to the
-    largest, 1; below 0 the next that are half of the smallest or less. None is tried below what makes it worth having.
+    No candidate is tried below what makes it worth having.
     """
     alone = known[NOTHING, ()]
 
@@ -204,14 +204,7 @@ def _in_corners(
 
     bests = [Best(NOTHING, (), alone, limits(trial, [query((NOTHING, ()), LEAST_N_M)], ROUGH / 2.0)[0])]
     least = max(LEAST_N_M, WORTH * bests[0].safe.stiffness_N_m) if bests[0].safe else LEAST_N_M
-    candidates: list[Choice] = []
-    for family in families:
-        equals = _equals(known, family)
-        bests.append(Best(family, equals[0], known[family, equals[0]]))
-        if bests[-1].nominal.stiffness_N_m > WORTH * alone.stiffness_N_m:
-            smaller = max((each for each in _values(known, family) if _is_half(each, equals[0])), default=equals[0])
-            some = (equals[round(place * (len(equals) - 1))] if place >= 0.0 else smaller for place in places)
-            candidates += dict.fromkeys((family, values) for values in some)
+    bests += [Best(family, first := _equals(known, family)[0], known[family, first]) for family in families]
     found = limits(trial, [query(each, least) for each in candidates], ROUGH / 2.0)
     safe = {choice: limit for choice, limit in zip(candidates, found, strict=True) if limit.stiffness_N_m}
     for place, best in enumerate(bests):
