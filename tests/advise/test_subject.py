@@ -117,3 +117,11 @@ def test_a_device_that_friction_holds_against_the_hand_is_refused_since_any_wall
 def test_a_number_that_the_command_gives_is_not_assumed_any_more(delay, overrides, assumed):
     subject = make_subject("demo", None, delay, None, ["event=[]", *overrides], KINDS)
     assert [each.key for each in subject.assumed] == assumed
+
+
+def test_an_element_that_is_none_of_those_tried_is_named_with_what_tries_it() -> None:
+    own = {**KINDS, "mine": KINDS["damping"]}
+    [*_, note] = make_subject("touch", None, None, None, [], own).notes
+    assert note.startswith("The element mine is not among what is tried")
+    assert "a sweep over its parameter" in note
+    assert not any("not among" in each for each in make_subject("touch", None, None, None, [], KINDS).notes)

@@ -18,6 +18,7 @@ from haploop.protocol.changes import Change, at_work
 from haploop.protocol.names import nearest
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.walls.registry import class_of
+from haploop.tools.advise.families import STABILIZERS
 from haploop.tools.advise.walls.cases import MOST_DELAY_S, hold_N, make_loop
 from haploop.tools.render.units import amount
 
@@ -41,6 +42,10 @@ _CHANGED = ", but for {0} as set"
 _NO_SPRING = (
     "The scene's wall is of the kind {0}; advice is on springs, which are what it tries. "
     "Take wall.kind out to be advised on a spring."
+)
+_NOT_TRIED = (
+    "{} not among what is tried, which are haploop's own elements; a sweep over its parameter and wall.stiffness tries "
+    "any element (haploop scenes demo_damping prints one to start from)."
 )
 _STUCK = (
     "Dry friction of {0} holds the device against the hand's {1}: it would not press on the wall, and any wall would "
@@ -128,6 +133,9 @@ def make_subject(
     rubs, presses_N = scene.friction, hold_N(make_loop(scene, has_task))
     if rubs and (most_N := max(rubs.kinetic, rubs.breakaway or 0.0)) >= presses_N:
         raise InvalidRequest(_STUCK.format(amount(most_N, "N"), amount(presses_N, "N")))
+    if others := sorted((kinds or {}).keys() - {kind for family in STABILIZERS for kind, _ in family.parts}):
+        are = f"The element {others[0]} is" if len(others) == 1 else f"The elements {', '.join(others)} are"
+        notes.append(_NOT_TRIED.format(are))
     given = [f"{each.partition('=')[0].strip()}." for each in overrides] + [f"{_DELAY}."] * (delay is not None)
     assumed = tuple(each for each in assumptions(path) if not f"{each.key}.".startswith(tuple(given)))
     return Subject(path.stem, scene, has_task, tuple(notes), assumed)
