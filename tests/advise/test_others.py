@@ -10,8 +10,9 @@ from haploop.tools.advise.families import (
     STABILIZERS,
     first_choices,
 )
-from haploop.tools.advise.others import hiding, others_bearing, worth_more
-from haploop.tools.advise.walls.limit import Limit, Query
+from haploop.tools.advise.others import hiding, others_bearing
+from haploop.tools.advise.walls.cases import Case
+from haploop.tools.advise.walls.limit import Query
 from haploop.tools.advise.walls.rendered import Rendered, Trying
 from haploop.tools.advise.walls.store import Failure, Store
 from haploop.tools.advise.walls.trial import Trial
@@ -26,18 +27,7 @@ def test_no_element_is_both_compared_by_its_wall_and_known_to_hide_it_and_few_ar
     }  # fmt: skip
 
 
-def test_another_element_goes_on_only_where_it_bears_more_than_every_simple_one_and_two_of_them_at_most():
-    def going_on(*stiffness_N_m: float):
-        return worth_more(
-            {(family, (1.0,)): Limit(k, k) for family, k in zip(OTHERS, stiffness_N_m, strict=False)}, 1500.0
-        )
-
-    assert going_on() == going_on(1400.0, 1500.0) == []
-    assert going_on(1600.0, 1400.0, 1300.0) == [OTHERS[0]]
-    assert going_on(1600.0, 1700.0, 1650.0) == [OTHERS[1], OTHERS[2]]
-
-
-def test_each_parameter_of_every_other_element_is_asked_for_a_wall_as_stiff_as_the_best_simple_one_bears(monkeypatch):
+def test_each_parameter_of_every_other_element_is_asked_for_a_wall_in_all_cases(monkeypatch):
     loop, asked = loop_of("premium15_cable"), []
 
     def of_jobs(self, jobs):
@@ -46,9 +36,10 @@ def test_each_parameter_of_every_other_element_is_asked_for_a_wall_as_stiff_as_t
         return [[None if kind == "adaptive-inertia" else Failure("a case", 1.0, gone=False)] for kind in kinds]
 
     monkeypatch.setattr(Trial, "of_jobs", of_jobs)
+    cases = Case(0.3), Case(3.0)
     with Trial(Store()) as trial:
-        found = others_bearing(loop, trial, 2100.0)
-    assert {job.walls[0].stiffness_N_m for job in asked} == {2100.0}
+        found = others_bearing(loop, trial, cases, 2100.0)
+    assert {(job.walls[0].stiffness_N_m, job.cases) for job in asked} == {(2100.0, cases)}
     assert len(asked) == sum(len(first_choices(family, loop)) for family in OTHERS)
     assert found == [(ADAPTIVE_INERTIA, values) for values in first_choices(ADAPTIVE_INERTIA, loop)]
 

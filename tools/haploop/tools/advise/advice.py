@@ -42,7 +42,10 @@ HOLDS_MORE = (
     "tried in every corner; `haploop compare` tells what it holds."
 )
 FELL = "With {0} walls of {1} bear every corner at three holds; at more holds and under attack one of {2} does not."
-NO_OTHER = "None of these bears {0:.2g} N/mm in the loop as described, at seven parameters each: {1}."
+NO_OTHER = (
+    "None of these bears {0:.2g} N/mm in every corner, a tenth more than the best of the wall alone, damping and "
+    "inertia, at seven parameters each: {1}."
+)
 READING = (
     "Every corner: what is uncertain 20 % more or less, what is assumed half or twice, in all combinations, or 32 of "
     "more, at holds of 0.3, 1 and 3 times the task's; a dash where an element allows no tenth more than the wall "
@@ -168,7 +171,7 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
     assumed = [of for of in subject.assumed if is_number(value_at(loop, of.key))]
     keys = [of.key for of in assumed]
     found = search(loop, keys, trial, stage)
-    told = [NO_OTHER.format(found.simple_N_m / 1e3, "; ".join(each.name for each in found.others))] * bool(found.others)
+    told = [NO_OTHER.format(found.worth_N_m / 1e3, "; ".join(each.name for each in found.others))] * bool(found.others)
     told += [HOLDS_MORE.format(of.family.name, of.family.words(of.values), of.held_N_m / 1e3) for of in found.hidden]
     told += [
         FELL.format(of.family.phrase(of.values), spring(of.safe.stiffness_N_m), spring(below))

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.families import HIDING, OTHERS, Family, Values, applies, box, first_choices, halton
 from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case
-from haploop.tools.advise.walls.limit import Limit, Query, ladder
+from haploop.tools.advise.walls.limit import Query, ladder
 from haploop.tools.advise.walls.rendered import tried
 from haploop.tools.advise.walls.store import Job, Tried
 from haploop.tools.advise.walls.trial import Trial
 
-# So many of the other elements are tried in every corner at most.
-_MOST = 2
 # Parameters that are tried of an element that renders less than its wall, and how closely its limit is found.
 _POINTS, _TOLERANCE = 6, 0.25
 
@@ -30,19 +28,10 @@ class Hidden:
     held_N_m: float
 
 
-def others_bearing(loop: Scene, trial: Trial, least_N_m: float) -> list[Choice]:
-    """Returns the other elements, each with every parameter, with which the loop as described bears a wall so stiff."""
+def others_bearing(loop: Scene, trial: Trial, cases: Sequence[Case], least_N_m: float) -> list[Choice]:
+    """Returns the other elements, each with every parameter, with which a wall so stiff bears some cases."""
     choices = [(family, values) for family in OTHERS for values in first_choices(family, loop)]
-    return _bearing(loop, trial, choices, least_N_m)
-
-
-def worth_more(known: Mapping[Choice, Limit], least_N_m: float) -> list[Family]:
-    """Returns the other elements whose limit is more than this, the best first."""
-    most: dict[Family, float] = {}
-    for (family, _), limit in known.items():
-        most[family] = max(most.get(family, 0.0), limit.stiffness_N_m)
-    better = [family for family in OTHERS if most.get(family, 0.0) > least_N_m]
-    return sorted(better, key=lambda family: -most[family])[:_MOST]
+    return bearing(loop, trial, choices, cases, least_N_m)
 
 
 def hiding(loop: Scene, trial: Trial, alone_N_m: float, least_N_m: float) -> tuple[Hidden, ...]:
@@ -52,7 +41,7 @@ def hiding(loop: Scene, trial: Trial, alone_N_m: float, least_N_m: float) -> tup
     for family in (each for each in HIDING if applies(each, loop)):
         choices = [(family, values) for values in halton(box(family, loop, alone_N_m), _POINTS)]
         # What is held is less than the wall: where that is too stiff for the loop, so is any that would hold as much.
-        points = [values for _, values in _bearing(loop, trial, choices, least_N_m)]
+        points = [values for _, values in bearing(loop, trial, choices, first, least_N_m)]
         held = tried(trial, [Query(loop, family.elements(values), first, rungs) for values in points], _TOLERANCE)
         some = zip(points, held, strict=True)
         values, best = max(some, key=lambda each: each[1].rendered.held_N_m, default=((), None))
@@ -61,7 +50,9 @@ def hiding(loop: Scene, trial: Trial, alone_N_m: float, least_N_m: float) -> tup
     return tuple(found)
 
 
-def _bearing(loop: Scene, trial: Trial, choices: Sequence[Choice], stiffness_N_m: float) -> list[Choice]:
-    first = tuple(Case(hold) for hold in FIRST_HOLDS)
-    jobs = [Job(loop, (Tried(stiffness_N_m, family.elements(values)),), first) for family, values in choices]
+def bearing(
+    loop: Scene, trial: Trial, choices: Sequence[Choice], cases: Sequence[Case], stiffness_N_m: float
+) -> list[Choice]:
+    """Returns those of some choices with which a wall of this stiffness bears all cases."""
+    jobs = [Job(loop, (Tried(stiffness_N_m, family.elements(values)),), tuple(cases)) for family, values in choices]
     return [choice for choice, [failure] in zip(choices, trial.of_jobs(jobs), strict=True) if not failure]

@@ -20,7 +20,7 @@ from haploop.tools.advise.families import (
     together,
 )  # fmt: skip
 from haploop.tools.advise.hardest import hardest
-from haploop.tools.advise.others import Choice, Hidden, hiding, others_bearing, worth_more
+from haploop.tools.advise.others import Choice, Hidden, hiding, others_bearing
 from haploop.tools.advise.walls.cases import FIRST_HOLDS, Case, attack, every_case
 from haploop.tools.advise.walls.corners import Corner, ranges
 from haploop.tools.advise.walls.limit import LEAST_N_M, Limit, Query, ladder, limits
@@ -42,8 +42,8 @@ STAGES = (
     "the wall alone",
     "one element",
     "two elements",
-    "every other element",
     "every corner",
+    "every other element",
     "softer walls and the attack",
     "changes of the device",
 )
@@ -64,7 +64,7 @@ class Found:
         as_assumed: the best, and how stiff, were every assumed number right; None where nothing is assumed.
         breaks: the softest wall known not to bear everything, and what it does; None where none was found.
         cases: how many it was tried in, attack included.
-        others: elements that bear no wall of ``simple_N_m`` as described, the best of the simple ones.
+        others: elements that bear no wall of ``worth_N_m`` in every corner, a tenth more than the best simple one.
         hidden: elements that render less than their wall, and may hold more than any other.
         alone_N_m: the wall without an element that withstood as much.
         hardest: the corners that are hardest on the wall with the element advised, and on that without.
@@ -78,7 +78,7 @@ class Found:
     breaks: Broken | None
     cases: int
     others: tuple[Family, ...] = ()
-    simple_N_m: float = 0.0
+    worth_N_m: float = 0.0
     hidden: tuple[Hidden, ...] = ()
     fell: tuple[tuple[Best, float], ...] = ()
     alone_N_m: float = 0.0
@@ -118,24 +118,24 @@ def search(
     stage("two elements")
     pairs = together(_equals(known, DAMPING)[-1], _equals(known, UNIDIRECTIONAL)[-1])
     known |= nominal([(BOTH, values) for values in pairs], *rungs)
-    stage("every other element")
-    borne = [limit.stiffness_N_m for limit in known.values()]
-    simple = max(LEAST_N_M, WORTH * known[NOTHING, ()].stiffness_N_m, *borne)
-    known |= nominal(others_bearing(loop, trial, simple), *rungs)
-    good = worth_more(known, simple)
-    more = [(family, values) for family in good for values in beside(_equals(known, family)[0])]
-    known |= nominal([choice for choice in more if choice not in known], *rungs)
-    hidden = hiding(loop, trial, near, WORTH * max(limit.stiffness_N_m for limit in known.values()))
-    some = (*SINGLE, BOTH, *good)
     stage("every corner")
     of, measured = ranges(loop, assumed), ranges(loop)
     query = Query(loop, (), every_case(of, FIRST_HOLDS), ladder(near / 4.0, near, 1.6))
     worst = hardest(loop, trial, (), of, limits(trial, [query], ROUGH)[0].stiffness_N_m)[:_HARDEST]
-    bests = in_corners(loop, trial, known, every_case(of, FIRST_HOLDS, worst), some, worth_trying(known, some))
+    cases, some = every_case(of, FIRST_HOLDS, worst), (*SINGLE, BOTH)
+    bests = in_corners(loop, trial, known, cases, some, worth_trying(known, some))
+    stage("every other element")
+    borne = max(best.safe.stiffness_N_m for best in bests if best.safe)
+    worth = max(LEAST_N_M, WORTH * borne)
+    going_on = others_bearing(loop, trial, cases, worth)
+    known |= nominal(going_on, *rungs)
+    good = [family for family in OTHERS if family in dict(going_on)]
+    bests += in_corners(loop, trial, known, cases, good, going_on)[1:] if good else []
+    hidden = hiding(loop, trial, near, WORTH * max(limit.stiffness_N_m for limit in known.values()))
     as_assumed = None
     if of != measured:
         likely = [(best.family, best.values) for best in bests[1:] if best.safe]
-        as_assumed = advised(in_corners(loop, trial, known, every_case(measured, FIRST_HOLDS), some, likely))
+        as_assumed = advised(in_corners(loop, trial, known, every_case(measured, FIRST_HOLDS), (*some, *good), likely))
     stage("softer walls and the attack")
     compared = rivals(bests, worst)
     won = withstand(loop, trial, compared, of)
@@ -149,7 +149,7 @@ def search(
     shown = tuple(best if each.family is best.family else each for each in bests)
     others = tuple(family for family in OTHERS if family not in good)
     return Found(
-        shown, best, won.bound_N_m, as_assumed, won.broken, count, others, simple, hidden, fell, alone.bound_N_m, hard
+        shown, best, won.bound_N_m, as_assumed, won.broken, count, others, worth, hidden, fell, alone.bound_N_m, hard
     )
 
 
