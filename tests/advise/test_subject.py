@@ -1,6 +1,7 @@
 """The subject of an advice: names, hands, delays, what a device file assumes, absurd numbers."""
 
 from contextlib import nullcontext
+from pathlib import Path
 
 import pytest
 
@@ -125,3 +126,9 @@ def test_an_element_that_is_none_of_those_tried_is_named_with_what_tries_it() ->
     assert note.startswith("The element mine is not among what is tried")
     assert "a sweep over its parameter" in note
     assert not any("not among" in each for each in make_subject("touch", None, None, None, [], KINDS).notes)
+
+
+def test_a_directory_does_not_hide_the_device_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "touch").mkdir()
+    assert make_subject("touch", None, None, None, [], KINDS).name == "touch"

@@ -134,8 +134,9 @@ def search(
     hidden = hiding(loop, trial, near, WORTH * max(limit.stiffness_N_m for limit in known.values()))
     as_assumed = None
     if of != measured:
-        likely = [(best.family, best.values) for best in bests[1:] if best.safe]
-        as_assumed = advised(in_corners(loop, trial, known, every_case(measured, FIRST_HOLDS), (*some, *good), likely))
+        some = (*some, *good)
+        right = every_case(measured, FIRST_HOLDS)
+        as_assumed = advised(in_corners(loop, trial, known, right, some, worth_trying(known, some)))
     stage("softer walls and the attack")
     compared = rivals(bests, worst)
     won = withstand(loop, trial, compared, of)

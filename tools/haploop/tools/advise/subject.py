@@ -176,10 +176,9 @@ def apply_events(scene: Scene) -> Scene:
 
 def _device(name: str) -> Path:
     """Returns the file that a name means."""
-    path = Path(name)
-    if path.suffix == ".toml" or path.exists():
+    path, known = Path(name), bundled("devices") | bundled("scenes")
+    if path.suffix == ".toml" or path.is_file() or (path.exists() and name not in known):
         return path
-    known = bundled("devices") | bundled("scenes")
     if name not in known:
         raise InvalidRequest(_unknown("DEVICE", name, list(known), "the path of a file with a device or a scene"))
     return known[name]
