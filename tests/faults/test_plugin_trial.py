@@ -62,7 +62,7 @@ def test_an_element_whose_force_at_rest_is_not_finite_is_refused_before_a_run_ta
 
 
 def test_an_element_that_gives_text_is_told_what_it_gave():
-    with pytest.raises(ElementError, match="it returned 'hello', which is text and no number"):
+    with pytest.raises(ElementError, match="it returned 'hello', and a force must be a number"):
         tried(source(at_force="return 'hello'"))
 
 

@@ -22,7 +22,11 @@ from helpers.scenes.brake import source
 BRAKE: dict[str, Any] = {"kind": "brake", "damping": 0.05, "acts": "always"}
 DAMPING: dict[str, Any] = {"kind": "damping", "damping": 0.1, "acts": "always"}
 # When it is tried on the motion of the loop, but not at rest; and twenty ticks after it was swapped in.
-FAILING = {"refused": source(at_force="1 / (motion.x == 0.0)"), "taken back": source(at_force="1 / (self.tick < 20)")}
+FAILING = {
+    "refused": source(at_force="1 / (motion.x == 0.0)"),
+    "taken back": source(at_force="1 / (self.tick < 20)"),
+    "no number": source(at_force="if self.tick >= 20: return float('nan')"),
+}
 
 
 def braked(tmp_path: Path) -> tuple[Path, Path]:

@@ -265,7 +265,7 @@ def test_an_element_that_fails_on_the_motion_at_hand_never_takes_the_place_of_th
 def test_text_is_no_force():
     of = own([{"kind": "text"}])
     controller = Controller(of, Timebase.from_scene(of), KINDS)
-    with pytest.raises(ElementError, match=r"it returned '1\.0', which is text and no number"):
+    with pytest.raises(ElementError, match=r"it returned '1\.0', and a force must be a number"):
         controller.answer([(-0.001,)])
 
 

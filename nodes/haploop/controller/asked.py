@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from haploop.controller.active_elements import ActiveElement
-from haploop.controller.dissipation.element import Element, ElementError, Motion
+from haploop.controller.dissipation.element import Element, ElementError, Motion, as_number
 from haploop.protocol.arrays import where
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -124,7 +124,12 @@ def answer_of(
     else:
         answer, own = active.element.force(motion, own)
     commanded = answer if active.acts == "always" else where(now.contact, answer, 0.0)
-    return answer, Told(own, row, commanded, force + commanded, (wall_J, own_J, output_J, total_J), commands)
+    try:
+        output = force + commanded
+    except TypeError:
+        as_number(answer)  # which says what it is
+        raise
+    return answer, Told(own, row, commanded, output, (wall_J, own_J, output_J, total_J), commands)
 
 
 def _acted(commands: tuple[Any, ...], declared: Declared) -> Any:

@@ -12,8 +12,7 @@ from haploop.controller.asked import first_memory
 from haploop.controller.dissipation import Element, ElementError, load_plugin
 from haploop.controller.dissipation.element import place_in
 from haploop.controller.estimators.base import Sample
-from haploop.controller.recorder import MOTION_COLUMNS
-from haploop.controller.tick import ControllerParams, ControllerState, tick
+from haploop.controller.tick import MOTION_COLUMNS, ControllerParams, ControllerState, tick
 from haploop.protocol.arrays import where
 from haploop.protocol.changes import Change
 from haploop.protocol.scene.scene import NO_ELEMENT, ElementTable

@@ -16,7 +16,15 @@ from haploop.controller.dissipation.element import place_in
 from haploop.controller.estimators.base import Sample
 from haploop.controller.estimators.choose import make_estimators
 from haploop.controller.recorder import Recorder
-from haploop.controller.tick import ControllerParams, ControllerState, NoForce, StateTuple, initial_state, tick
+from haploop.controller.tick import (
+    ControllerParams,
+    ControllerState,
+    NoForce,
+    StateTuple,
+    demand_finite,
+    initial_state,
+    tick,
+)
 from haploop.protocol.changes import Change, Event, restoration
 from haploop.protocol.scene.scene import NO_ELEMENT, Scene
 from haploop.protocol.ticks import DELAY, Timebase
@@ -53,6 +61,8 @@ class Controller:
         # The code of plugins that came with a swap, with its tick and file: a later one takes the place of one before.
         self._reloaded: tuple[tuple[int, str | None, Kinds], ...] = ()
         self._restores = scene.run.faulty_swap == "restore"
+        # Before this tick some element is so new that it is taken back where it fails.
+        self._new_until = 0
         self.params = make_params(scene, time.period_s, self._kinds)
         self.state: StateTuple | None = None
         self.tick = 0
@@ -106,14 +116,17 @@ class Controller:
         if state is None:
             state = self.state = initial_state(self.params, samples[0])
         for sample in samples:
-            if self.tick >= self._next_change:
+            now = self.tick
+            if now >= self._next_change:
                 state = self._change(ControllerState(*state), sample)
             try:
-                state, row = tick(self.params, state, sample)
+                after, row = tick(self.params, state, sample)
+                if now < self._new_until:
+                    demand_finite(self.params, row, now - self._control_rate + 1)
             except NoForce as error:
-                state, row = self._without(error, ControllerState(*state), sample)
-            self.state = state
-            self.tick += 1
+                after, row = self._without(error, ControllerState(*state), sample)
+            state = self.state = after
+            self.tick = now + 1
             forces.append(row[-2])
             for index, names in recorder.own:
                 row += self._shown(index, state[3][index], names)
@@ -147,15 +160,17 @@ class Controller:
             else:
                 self.params, state = params, after
                 self._reloaded = reloaded if change.plugin else self._reloaded
+                if change.swap is not None and self._restores:
+                    self._new_until = change.tick + self._control_rate
         self._next_change = self._changes[0].tick if self._changes else _NEVER
         self.recorder.open(self.params)
         return state
 
     def _without(self, error: NoForce, state: ControllerState, sample: Sample) -> tuple[StateTuple, list[Any]]:
-        """Returns state and row of this tick after swaps of the last second, whose elements raise, are taken back.
+        """Returns state and row of this tick after swaps of the last second, whose elements fail, are taken back.
 
         Raises:
-            ElementError: an element raises that no such swap has brought, or the scene asks for the end.
+            ElementError: an element fails that no such swap has brought, or the scene asks for the end.
         """
         while True:
             why, place = error.sentence(self.params, self.tick), error.index
@@ -170,6 +185,9 @@ class Controller:
             sentence = f"{why} It is taken back: {change.describe()}."
             self.recorder.restored.append(restoration(change, sentence, since, plugin))
             try:
-                return tick(self.params, state, sample)
+                after, row = tick(self.params, state, sample)
+                demand_finite(self.params, row, self.tick - self._control_rate + 1)
             except NoForce as other:
                 error = other
+            else:
+                return after, row

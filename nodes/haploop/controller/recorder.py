@@ -7,14 +7,12 @@ from array import array
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from haploop.controller.active_elements import Description
-from haploop.controller.tick import ControllerParams
+from haploop.controller.tick import MOTION_COLUMNS, ControllerParams
 from haploop.protocol.changes import Change, Event
 from haploop.protocol.transport.telemetry import Block
 
 if TYPE_CHECKING:
     import numpy as np
-
-MOTION_COLUMNS = ("x", "v", "a", "wall")
 
 
 class Recorder:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from haploop.controller.active_elements import ActiveElement
 from haploop.controller.asked import Declared, Told, answer_of, first_memory
-from haploop.controller.dissipation.element import Motion, raised
+from haploop.controller.dissipation.element import ElementError, Motion, as_number, raised
 from haploop.controller.estimators.base import Estimator, Sample
 from haploop.protocol.arrays import where
 from haploop.protocol.walls.wall import Wall
+
+# What stands in the row of a tick before the forces of the elements.
+MOTION_COLUMNS = ("x", "v", "a", "wall")
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +71,23 @@ class NoForce(Exception):
         return f"Element {self.index} ({element.kind}) gave no force at tick {tick}: {what}."
 
 
-def as_number(force: Any) -> float:
-    """Returns an element's force as a number; TypeError where it is text, or nothing that float takes."""
-    if isinstance(force, str | bytes):
-        raise TypeError(f"it returned {force!r}, which is text and no number")
-    return float(force)
+def demand_finite(params: ControllerParams, row: list[Any], since: int) -> None:
+    """Looks whether an element that a swap at a tick from ``since`` on has brought spoils the total of a row.
+
+    Raises:
+        NoForce: its force is the first in the row that is no finite number.
+        ElementError: that is so for a member of a batch.
+    """
+    is_finite = abs(row[-2]) < math.inf
+    if is_finite is True or (is_finite is not False and is_finite.all()):
+        return
+    if getattr(is_finite, "ndim", 0):
+        raise ElementError("A force of a member is no finite number.")
+    place = next((place for place, value in enumerate(row[:-2]) if not math.isfinite(value)), 0) - len(MOTION_COLUMNS)
+    if place >= 0 and (swapped := params.elements[place].swapped) and swapped[0] >= since:
+        raise NoForce(place) from ValueError(
+            f"it returned {row[len(MOTION_COLUMNS) + place]}, and a force must be a finite number"
+        )
 
 
 def initial_state(params: ControllerParams, sample: Sample) -> ControllerState:

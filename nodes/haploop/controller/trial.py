@@ -20,9 +20,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from haploop.controller.active_elements import make_element
-from haploop.controller.dissipation.element import ASKABLE, Element, ElementError, Motion, place_in, raised
+from haploop.controller.dissipation.element import ASKABLE, Element, ElementError, Motion, as_number, place_in, raised
 from haploop.controller.dissipation.registry import PluginError, load_source
-from haploop.controller.tick import as_number
 from haploop.protocol.installed import all_brought
 from haploop.protocol.quantity import MEANT
 from haploop.protocol.scene.scene import ElementTable

@@ -33,9 +33,10 @@ Answer = tuple[bool, str, Message]
 _MOST_TOLD = 5
 _CHANGES = ("swap", "set", "undo")
 _PROBATION = {
-    "restore": "If it raises within its first second, what was there before comes back; the terminal of the run tells "
-    "it at once, the log and the summary keep it, with the file and the line. If it raises later, the run ends.",
-    "end": "If it raises, the run ends, and tells the file and the line.",
+    "restore": "If it raises or gives no finite number within its first second, what was there before comes back; the "
+    "terminal of the run tells it at once, the log and the summary keep it, with the file and the line. Later, "
+    "the run ends.",
+    "end": "If it raises or gives no finite number, the run ends, and tells the file and the line.",
 }
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from haploop.controller.recorder import MOTION_COLUMNS
+from haploop.controller.tick import MOTION_COLUMNS
 from haploop.launch.plan.effect import Effect, Stage
 from haploop.launch.plan.effects import all_effects, effects_of
 from haploop.plant.chain.chain import Chain

@@ -18,7 +18,7 @@ class ElementError(Exception):
 
 
 _HERE = Path(__file__).parent
-_NO_PLUGIN = (_HERE.parent, _HERE / "registry.py", Path(plugin_file.__file__))
+_NO_PLUGIN = (_HERE.parent, Path(__file__), _HERE / "registry.py", Path(plugin_file.__file__))
 
 
 def places_of(error: BaseException | None) -> list[tuple[str, int]]:
@@ -45,6 +45,16 @@ def raised(error: BaseException | None, kind: type[Element] | None = None) -> st
     name = getattr(error, "name", None)
     hint = f'. An element is told what it names in its class: asks = ("{name}",)' if name in ASKABLE else ""
     return f"{type(error).__name__}: {error}{place_in(kind, error)}{hint}"
+
+
+def as_number(force: Any) -> float:
+    """Returns an element's force as a number; TypeError where it is text, or nothing that float takes."""
+    try:
+        if not isinstance(force, str | bytes):
+            return float(force)
+    except TypeError:
+        pass
+    raise TypeError(f"it returned {force!r}, and a force must be a number")
 
 
 # What an element may ask for beside the motion, which it is told then.
