@@ -37,7 +37,7 @@ def test_a_window_that_spans_a_change_bears_no_word_and_shows_no_stiffness(tmp_p
     late, early = run(changed(1.4, tmp_path / "late"), in_process=True), run(changed(1.0), in_process=True)
     assert (late["verdict"], late["window"]["displayed_stiffness_N_m"]) == ("undecided", None)
     assert "The loop was changed at 1.4 s, within the window from 1 s on" in late["verdict_rule"]
-    assert early["verdict"] == "steady"
+    assert early["verdict"] == "no-swing-seen"
     assert early["window"]["displayed_stiffness_N_m"] is not None
     text = shown(summary_table(late))
     assert text.startswith("undecided")
@@ -58,12 +58,12 @@ def test_a_loop_that_is_judged_at_its_end_may_have_been_changed_just_before():
 def test_a_run_that_fails_is_undecided_in_its_summary_report_and_page_and_failed_in_its_figure(tmp_path):
     """Even at rest for long before: the same run without the fault is steady."""
     plugin, out = tmp_path / "brake.py", tmp_path / "run"
-    for fault, word in (("pass", "steady"), ("if self.tick > 1400: raise ValueError('deep')", "undecided")):
+    for fault, word in (("pass", "no-swing-seen"), ("if self.tick > 1400: raise ValueError('deep')", "undecided")):
         plugin.write_text(source(at_force=fault))
         overrides = ["duration=1.5", 'run.verdict="window"', "dissipation=[{kind='brake', damping=0.8}]"]
         spec = prepare(SCENE, overrides, plugins=[plugin], out=out / word)
         kinds = registry([plugin])
-        if word == "steady":
+        if word == "no-swing-seen":
             assert run_in_process(spec.scene, kinds)["verdict"] == word
             continue
         with pytest.raises(RunFailed, match="deep"):

@@ -76,9 +76,16 @@ def test_the_summary_table_begins_with_the_verdict_and_what_was_seen(swap: dict[
     assert swap["verdict_rule"].startswith(second.strip().rstrip("."))
 
 
-def test_a_run_too_short_for_a_window_is_told_as_that_and_not_as_one_without_a_swing(swap: dict[str, Any]) -> None:
-    unjudged = {key: value for key, value in swap.items() if key != "stability"} | {"verdict": "steady"}
-    assert [told({**unjudged, "duration_s": s}) for s in (0.2, 0.6)] == ["too short to see", "no swing seen"]
+def test_a_run_that_was_not_judged_is_told_by_what_was_seen_also_by_a_summary_of_an_earlier_version(
+    swap: dict[str, Any],
+) -> None:
+    unjudged = {key: value for key, value in swap.items() if key != "stability"}
+    words = ("steady", "no-swing-seen", "limit-cycle", "swinging", "undecided", "no-contact")
+    assert [told({**unjudged, "verdict": word}) for word in words] == [
+        "no swing seen", "no swing seen", "swinging", "swinging", "undecided", "no-contact",
+    ]  # fmt: skip
+    short = [told({**unjudged, "verdict": word, "duration_s": 0.2}) for word in words[:4]]
+    assert short == ["too short to see", "too short to see", "swinging", "swinging"]
     assert told({**swap, "verdict": "steady", "duration_s": 0.2}) == "steady"
     assert row(shown(summary_table({**swap, "ticks": 1}), 100), "ran")[0].startswith("3 s, 1 tick, in")
 

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from haploop.tools.cli.app import app
 from haploop.tools.figure.data import FigureError
-from haploop.tools.sweep.map.data import AMPLITUDE, MapData, make_map_data
+from haploop.tools.sweep.map.data import AMPLITUDE, VERDICTS, MapData, make_map_data
 from haploop.tools.sweep.map.edges import State, find_edges
 from haploop.tools.sweep.map.figure import MOST_LINES, bisect_figure, draw_map
 from haploop.tools.sweep.table import read
@@ -155,6 +155,19 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         done = CliRunner().invoke(app, ["sweep", str(file), "--out", str(made[name]), "--workers", "1"])
         assert done.exit_code == 0, done.output
     return made
+
+
+def test_a_sweep_of_runs_that_are_not_pushed_calls_none_steady(swept: dict[str, Path]) -> None:
+    """In its table, its boundaries, its map and its own file; ``holds`` is steady unless it says otherwise."""
+    found = read(swept["search"])
+    assert {"no-swing-seen", "swinging"} <= set(found["verdict"].tolist()) <= {*VERDICTS, "no-swing-seen", "swinging"}
+    assert not {"steady", "limit-cycle"} & set(found["verdict"].tolist())
+    assert np.isfinite(found.boundary["boundary"]).any()
+    assert 'holds = "no-swing-seen"' in (swept["search"] / "sweep.toml").read_text()
+    data = make_map_data(found.columns, found.units, found.sweep, found.boundary)
+    told = " ".join(words(bisect_figure(data), gid) for gid in ("description", "star words", "legend"))
+    assert "“no swing seen” up to" in told
+    assert "steady" not in told
 
 
 @pytest.mark.slow

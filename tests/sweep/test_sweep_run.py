@@ -164,7 +164,7 @@ def test_a_run_that_fails_is_no_far_side_of_a_boundary(tmp_path: Path) -> None:
     text = '[set]\ndissipation = [{ kind = "raising" }]\n[axes]\n"dissipation.0.force_N" = [0.1, 0.3]\n'
     search = '[bisect]\naxis = "dissipation.0.force_N"\ntolerance = "0.01 N"\nholds = "steady"\n'
     table = swept(tmp_path, text + search, plugins=[tmp_path / "raising.py"])
-    assert table["verdict"].tolist() == ["steady", None]
+    assert table["verdict"].tolist() == ["no-swing-seen", None]
     assert "the run at 0.3 failed: " in table.boundary["why"][0]
     assert np.isnan(table.boundary["boundary"][0])
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from haploop.logger.books.balance import BooksState, moved_J, residual_J, stored_J, total_J
 from haploop.logger.books.ideal_wall import DISSIPATED
 from haploop.logger.log import LogError
-from haploop.logger.verdict.measures import RunMeasures
+from haploop.logger.verdict.measures import NO_SWING, UNTOLD, WINDOW_S, RunMeasures
 from haploop.protocol.files import read_text
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.transport.machine import MACHINE, Machine
@@ -110,6 +110,8 @@ def outcome(
         changed_s: when the loop was last changed within the window, or None.
     """
     verdict = measures.verdict(diverged, measures.untold(ran["ticks"], ran["ended"], changed_s))
+    if verdict.word == NO_SWING and ran["duration_s"] < WINDOW_S:  # too short to see a swing
+        verdict = verdict._replace(rule=f"{UNTOLD['short']} {verdict.rule}")
     if changed_s is not None:
         measures = measures.of_two_loops()
     return {

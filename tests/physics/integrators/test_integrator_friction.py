@@ -138,7 +138,7 @@ def test_all_effects_at_once_run_by_every_method_and_blocks_change_no_bit(method
     one, many = (in_blocks(resolved, ticks) for ticks in (1, 40))
     assert one["trajectory_sha256"] == many["trajectory_sha256"]
     assert one["energy"] == many["energy"]
-    assert one["verdict"] in ("steady", "limit-cycle")
+    assert one["verdict"] in ("no-swing-seen", "swinging")
 
 
 @pytest.mark.slow

@@ -46,10 +46,6 @@ def _numbers(entry: Any, key: str = "") -> Iterator[tuple[str, float | None]]:
         yield key, entry
 
 
-# What is said beside the word of a run that was not pushed.
-_SEEN = "no swing was seen at the end of the run, which was not pushed"
-
-
 @dataclass(frozen=True, eq=False)
 class Result:
     """A finished run.
@@ -78,18 +74,16 @@ class Result:
 
     @property
     def verdict(self) -> str:
-        """``steady``, ``limit-cycle``, ``growing``, ``diverged``, ``no-contact`` or ``undecided``."""
+        """``steady``, ``limit-cycle``, ``growing``, ``diverged``, ``no-contact`` or ``undecided``.
+
+        ``no-swing-seen`` or ``swinging`` where the run was not pushed and its last half second alone was looked at.
+        """
         return self.summary["verdict"]
 
     @property
     def provisos(self) -> tuple[str, ...]:
-        """What a verdict of ``steady`` rests on, in words: ``only friction holds it``; empty where on nothing.
-
-        Where the scene asks for the cheap verdict, ``run.verdict = "window"``, that is no more than what was seen.
-        """
-        if "stability" not in self.summary:
-            return (_SEEN,) if self.verdict == "steady" else ()
-        return tuple(self.summary["stability"].get("provisos", ()))
+        """What a verdict of ``steady`` rests on, in words: ``only friction holds it``; empty where on nothing."""
+        return tuple(self.summary.get("stability", {}).get("provisos", ()))
 
     def quantity(self, key: str) -> pint.Quantity[float]:
         """A number of the summary with its unit, by dotted key: ``"window.oscillation_m"``, ``"energy.moved_J"``.

@@ -16,6 +16,9 @@ CROSSINGS = 4
 SMALLEST_SWING_M = 1e-6
 # A quantised position on the wall's face may lie inside by this much, relative to the face's position.
 ROUNDING = 1e-12
+# What is said of a window alone, which tells nothing of stability, by the verdicts of a pushed loop that look the same.
+NO_SWING, SWINGING = "no-swing-seen", "swinging"
+OF_WINDOW = {"steady": NO_SWING, "limit-cycle": SWINGING}
 # Why the window of a run bears no word, whatever is seen in it.
 UNTOLD = {
     "no tick": "The run ended before its first tick was done.",
@@ -24,12 +27,12 @@ UNTOLD = {
     "changed": "The loop was changed at {at_s:g} s, within the window from {from_s:g} s on, "
     "which does not show it as it is now.",
 }
-_LIMIT_CYCLE = f"; a limit cycle swings at least {CROSSINGS} times, half as wide in the second half or wider."
+_SWINGING = f"; what is told as swinging does so {CROSSINGS} times or more, half as wide in the second half or wider."
 _RULES = {
     "swings": "From {from_s:.6g} s on the position swung through the middle of its motion {times} times by more than "
-    "{swing_um:.3g} µm, in the second half {growth:.2f} times as wide as in the first" + _LIMIT_CYCLE,
+    "{swing_um:.3g} µm, in the second half {growth:.2f} times as wide as in the first" + _SWINGING,
     "rests": "From {from_s:.6g} s on the position did not swing by more than {swing_um:.3g} µm to both sides of the "
-    "middle of its motion" + _LIMIT_CYCLE,
+    "middle of its motion" + _SWINGING,
     "untouched": "No tick from {from_s:.6g} s on was in contact.",
 }
 
@@ -92,7 +95,7 @@ class Extremes(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """One word and the rule that gave it."""
+    """A word, of a window ``no-swing-seen``, ``swinging``, ``no-contact`` or ``undecided``, and the rule behind it."""
 
     word: str
     rule: str
@@ -127,7 +130,7 @@ class RunMeasures(NamedTuple):
             return Verdict("undecided", untold if untold == UNTOLD["no tick"] else f"{untold} {rule}")
         if not window.touched:
             return Verdict("no-contact", rule)
-        return Verdict("limit-cycle" if window.crossings >= CROSSINGS and window.growth >= 0.5 else "steady", rule)
+        return Verdict(SWINGING if window.crossings >= CROSSINGS and window.growth >= 0.5 else NO_SWING, rule)
 
     def untold(self, ticks: int, ended: str, changed_s: float | None) -> str:
         """Returns why the window bears no word, "" where it does.

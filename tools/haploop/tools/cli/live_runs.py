@@ -35,12 +35,13 @@ class RecordedRun:
         """Makes it of its summary, written at a time in s; of one that cannot be read its folder's name is told."""
         from haploop.logger.log import LogError
         from haploop.logger.summary import read
+        from haploop.tools.render.terminal import told
 
         name, when = file.parent.name, time.strftime("%d %b %H:%M", time.localtime(ended_s))
         try:
             summary = read(file)
-            told = [summary["verdict"], *summary.get("stability", {}).get("provisos", ()), when]
-            return cls(name, file.parent, summary.get("title") or name, ", ".join(told))
+            words = [told(summary), *summary.get("stability", {}).get("provisos", ()), when]
+            return cls(name, file.parent, summary.get("title") or name, ", ".join(words))
         except (LogError, KeyError):
             return cls(name, file.parent, name, when)
 

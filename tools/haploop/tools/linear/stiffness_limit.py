@@ -9,7 +9,7 @@ from haploop.controller.dissipation import Element
 from haploop.controller.estimators.kalman import assumed_noises
 from haploop.launch.plan.effects import all_effects
 from haploop.launch.runs.in_process import run_in_process
-from haploop.logger.verdict.measures import WINDOW_S
+from haploop.logger.verdict.measures import NO_SWING, SWINGING, WINDOW_S
 from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.hand_force import Step
 from haploop.protocol.scene.paths import without
@@ -34,7 +34,7 @@ class StiffnessLimit:
 
     @property
     def confirmed(self) -> bool:
-        return self.below == "steady" and self.above in ("limit-cycle", "diverged")
+        return self.below in ("steady", NO_SWING) and self.above in ("limit-cycle", SWINGING, "diverged")
 
 
 def stiffness_limit(scene: Scene, kinds: dict[str, type[Element]]) -> StiffnessLimit:

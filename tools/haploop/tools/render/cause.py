@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from haploop.logger.summary import Summary
 
 # Verdicts of a loop that swings.
-SWINGS = ("limit-cycle", "growing", "diverged")
+SWINGS = ("limit-cycle", "swinging", "growing", "diverged")
 # By the cause with the largest share of what the wall gave away.
 _BECAUSE = {
     "delay_J": "each force comes after a delay, so that the wall still pushes while the device moves out",

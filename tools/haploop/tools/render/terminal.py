@@ -44,8 +44,11 @@ def as_text(shown: RenderableType) -> str:
 
 
 def seen(verdict: str) -> str:
-    """Returns the word for what the last half second shows, which says nothing yet of stability."""
-    return {"steady": "no swing seen", "limit-cycle": "swinging"}.get(verdict, verdict)
+    """Returns the word for what the last half second shows, in a file of an earlier version, too."""
+    from haploop.logger.verdict.measures import OF_WINDOW
+
+    word = OF_WINDOW.get(verdict, verdict)
+    return word.replace("-", " ") if word in OF_WINDOW.values() else word
 
 
 def told(summary: Summary) -> str:
@@ -54,8 +57,8 @@ def told(summary: Summary) -> str:
 
     if "stability" in summary:
         return summary["verdict"]
-    is_short = summary["verdict"] == "steady" and summary["duration_s"] < WINDOW_S
-    return "too short to see" if is_short else seen(summary["verdict"])
+    word = seen(summary["verdict"])
+    return "too short to see" if word == "no swing seen" and summary["duration_s"] < WINDOW_S else word
 
 
 def verdict_style(verdict: str) -> str:

@@ -22,6 +22,7 @@ from haploop.launch.scene.number import Number, si
 from haploop.launch.scene.reading.lines import line_in
 from haploop.launch.scene.reading.tables import parse
 from haploop.launch.scene.schema import TomlSchema
+from haploop.logger.verdict.measures import OF_WINDOW
 from haploop.protocol.names import nearest
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.scene import Scene
@@ -34,7 +35,7 @@ from haploop.tools.sweep.record import make_columns, usual
 from haploop.tools.sweep.table import Column
 
 MOST_AXES = 3
-Verdict = Literal["steady", "limit-cycle", "diverged", "no-contact"]
+Verdict = Literal["steady", "limit-cycle", "diverged", "no-contact", "no-swing-seen", "swinging"]
 
 
 class BisectTable(Model):
@@ -92,6 +93,8 @@ class _Reader:
         axes = self._axes(shape)
         record = self._record(shape, axes)
         bisect = self._bisect(table.bisect, axes) if table and table.bisect else None
+        if bisect and base and base.run.verdict == "window":  # of which no run is called steady
+            bisect = replace(bisect, holds=OF_WINDOW.get(bisect.holds, bisect.holds))
         if self._layers.mistakes or table is None or base is None:
             raise SceneError(self._layers.mistakes)
         title = table.title or self._layers.path.stem

@@ -15,6 +15,7 @@ from haploop.controller.dissipation import registry
 from haploop.launch.batch.run import run_batch
 from haploop.launch.spec import RunFailed
 from haploop.logger.summary import Summary
+from haploop.logger.verdict.measures import NO_SWING, SWINGING
 from haploop.protocol.scene.effects import Noise
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import Constant, HandForce, MinimumJerk, Ramp, Sine, Step
@@ -184,7 +185,7 @@ def _row(interpretation: Point, runs: dict[str, Summary], books: dict[str, Exten
     # Peak to peak in the last half second; infinite for a run that diverged or failed.
     swing = {name: math.inf if lost[name] else result["window"]["oscillation_m"] for name, result in runs.items()}
     out = {name: result["window"]["outside_fraction"] for name, result in runs.items() if "window" in result}
-    cycles = {name: result.get("verdict") in ("limit-cycle", "diverged") for name, result in runs.items()}
+    cycles = {name: result.get("verdict") in (SWINGING, "diverged") for name, result in runs.items()}
     found = {
         "a cycles": float(not cycles["a"]),
         "a bounded": MOST if lost["a"] or lost["a longer"] else over(swing["a longer"], GROWN * swing["a"]),
@@ -199,7 +200,7 @@ def _row(interpretation: Point, runs: dict[str, Summary], books: dict[str, Exten
         "c smaller": over(MUCH * swing["c"], swing["b"]),
         "c passive": books["sampled"].not_passive,
         "c monotone": books["sampled"].not_monotone,
-        "c steady": float(runs["c"].get("verdict") != "steady"),
+        "c steady": float(runs["c"].get("verdict") != NO_SWING),
         "c truly passive": books["true"].not_passive,
         "c beats bidirectional": over(swing["c"], swing["bidirectional"]),
     }

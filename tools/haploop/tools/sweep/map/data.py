@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from haploop.logger.verdict.measures import OF_WINDOW
 from haploop.tools.figure.data import FigureError
 from haploop.tools.sweep.map.axis import Axis
 from haploop.tools.sweep.table import JOINS, ResolvedSweep
@@ -34,6 +35,7 @@ class Verdict(IntEnum):
 
 # Their words in the table of a sweep, by number.
 VERDICTS = tuple(verdict.name.lower().replace("_", "-") for verdict in Verdict)
+_LIKE = {of_window: verdict for verdict, of_window in OF_WINDOW.items()}
 
 
 @dataclass(frozen=True)
@@ -165,6 +167,11 @@ class MapData:
         """Tells whether the verdicts are the cheap ones."""
         return self.sweep.get("base", {}).get("run", {}).get("verdict") == "window"
 
+    def word(self, verdict: int) -> str:
+        """Returns a verdict in words; where no run was pushed, what its window shows."""
+        word = VERDICTS[verdict]
+        return (OF_WINDOW.get(word, word) if self.is_unpushed else word).replace("-", " ")
+
     def provisos(self, row: int) -> list[str]:
         """Returns what the verdict of a row rests on, where that is recorded."""
         return list(filter(None, str(self.columns.get(PROVISOS, {row: ""})[row] or "").split(JOINS)))
@@ -183,7 +190,8 @@ class MapData:
 
 
 def verdict_number(word: str | None) -> int:
-    """Returns the place of a verdict in ``VERDICTS``; a run without a verdict failed."""
+    """Returns the place of a verdict in ``VERDICTS``, of a window's that of its like; a run without one failed."""
+    word = _LIKE.get(word, word)
     return VERDICTS.index(word) if word in VERDICTS else Verdict.FAILED
 
 

@@ -27,7 +27,7 @@ class Edges:
     Attributes:
         along: the axis that was bisected, with its planned points.
         others: the other axes, along x first; none where there is none.
-        holds: the verdict on the near side.
+        holds: the verdict on the near side, in words.
         rising: whether the search went towards greater values.
         state: a ``State``; of seeds that differ, that of the seed that holds least far.
         nearest, low, high: the boundary of the seed that holds least far; the brackets of all seeds together.
@@ -72,7 +72,7 @@ def find_edges(data: MapData) -> Edges:
             seen = State.FOUND
         elif verdict_number(started) == Verdict.FAILED:
             seen = State.UNKNOWN
-        elif started != holds:
+        elif verdict_number(started) != verdict_number(holds):
             seen = State.NONE_HOLDS
         else:
             seen = State.ALL_HOLD if table["changes"][row] == 0 else State.UNKNOWN
@@ -85,7 +85,10 @@ def find_edges(data: MapData) -> Edges:
             low[at] = np.fmin(low[at], table["low"][row])
             high[at] = np.fmax(high[at], table["high"][row])
     more = int(np.sum(np.asarray(table["changes"]) > 1))
-    return Edges(along, tuple(others), holds, rising, state, nearest, low, high, more)
+    word = data.word(verdict_number(holds))
+    return Edges(
+        along, tuple(others), f"“{word}”" if data.is_unpushed else word, rising, state, nearest, low, high, more
+    )
 
 
 def _places(table: Columns, axes: Sequence[Axis], rows: np.ndarray) -> list[tuple[int, ...]]:
@@ -128,7 +131,7 @@ def furthest(edges: Edges) -> Answer | None:
     return Answer(index, value, (f"{edges.holds} up to {with_unit(value, edges.along.unit)}",), open_end=False)
 
 
-def stiffest_steady(axes: Sequence[Axis], cells: Cells) -> Answer | None:
+def stiffest_steady(axes: Sequence[Axis], cells: Cells, steady_word: str = "steady") -> Answer | None:
     """Finds the stiffest steady wall below which every wall that was tried with the same other values is steady, too.
 
     Where several cells share it, the one in the middle of them is taken. None where the wall was not swept, or no
@@ -151,4 +154,4 @@ def stiffest_steady(axes: Sequence[Axis], cells: Cells) -> Answer | None:
     value = float(axes[along].values[stiffest])
     open_end, words = stiffest == held.shape[-1] - 1, spring(value)
     beyond, least = (" and perhaps beyond", "≥ ") if open_end else ("", "")
-    return Answer(index, value, (f"steady up to {words}{beyond}", f"{least}{words}"), open_end)
+    return Answer(index, value, (f"{steady_word} up to {words}{beyond}", f"{least}{words}"), open_end)

@@ -89,9 +89,9 @@ def make_figure(data: MapData) -> Figure:
             axis.dress(ax, which, sheet.is_low(number) if which == "x" else sheet.is_left(number))
         panel_title(ax, panel.titles[0])
         over.drawn = {it.name: draw_line(ax, it, along, styles[it.name]) for it in over.lines if it.pieces}
-    sheet.column.signs(verdict_signs(cells.count(), as_points=layout.y is None))
+    sheet.column.signs(verdict_signs(cells.count(), data.word, as_points=layout.y is None))
     if scale:
-        sheet.column.amplitudes(scale)
+        sheet.column.amplitudes(scale, data.word(Verdict.LIMIT_CYCLE))
     sheet.column.signs(line_signs(styles, overs))
     sheet.column.notes(map_notes(data, cells, layout, overs))
     fix_layout(sheet.figure)
@@ -102,7 +102,7 @@ def make_figure(data: MapData) -> Figure:
         else:
             mark_disagreement(ax, along[0], along[1], panel.cells)
         star = None
-        if found := stiffest_steady(along, panel.cells):
+        if found := stiffest_steady(along, panel.cells, data.word(Verdict.STEADY)):
             x, *rest = (axis.coordinates[index] for axis, index in zip(along, found.index, strict=True))
             y = rest[0] if rest else float(swings.place(panel.cells.amplitude_m)[found.index])
             star = Star(x, y, found.words, unsteady_areas(along[0], along[1], panel.cells) if rest else ())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from haploop.tools.figure.style import GREY
 from haploop.tools.figure.style import VERDICTS as COLOURS
 from haploop.tools.render.units import amount
-from haploop.tools.sweep.map.data import VERDICTS, Verdict
+from haploop.tools.sweep.map.data import Verdict
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -38,23 +38,18 @@ LOOKS: dict[int, Look] = {
     Verdict.GROWING: Look("#7A2430", "+++", "#D0A0A8", "v", COLOURS["growing"]),
     Verdict.DIVERGED: Look("#3B0F1E", "///", "#A58090", "^", COLOURS["diverged"]),
 }
-AMPLITUDES = "limit cycle: swing, peak to peak"
 # Of amplitudes that have colours of their own, the least over the greatest.
 _RANGE = 1e-5
 
 
-def verdict_words(verdict: int) -> str:
-    return VERDICTS[verdict].replace("-", " ")
-
-
-def verdict_signs(counts: Mapping[int, int], as_points: bool) -> list[Artist]:
-    """Makes the sign of every verdict, a point or a cell, labelled with how many cells came to it."""
+def verdict_signs(counts: Mapping[int, int], word: Callable[[int], str], as_points: bool) -> list[Artist]:
+    """Makes the sign of every verdict, a point or a cell, labelled with its word and how many cells came to it."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     signs: list[Artist] = []
     for number, count in counts.items():
-        look, label = LOOKS[number], f"{verdict_words(number)}: {count} {'cell' if count == 1 else 'cells'}"
+        look, label = LOOKS[number], f"{word(number)}: {count} {'cell' if count == 1 else 'cells'}"
         if as_points:
             signs.append(Line2D([], [], marker=look.marker, color=look.colour, linestyle="none", label=label))
         else:

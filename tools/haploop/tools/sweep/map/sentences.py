@@ -13,17 +13,25 @@ from haploop.tools.sweep.map.axis import Axis, short
 from haploop.tools.sweep.map.data import NOT_RUN, STIFFNESS, WIDTH, Cells, Layout, MapData, Verdict
 from haploop.tools.sweep.map.edges import Answer, Edges, State, stiffest_steady
 from haploop.tools.sweep.map.lines import PanelLines
-from haploop.tools.sweep.map.looks import verdict_words
 
 # What fits into the line below the title; the base scene's title is cut short before anything else is.
 _BETWEEN, _LETTERS, _LEAST_LETTERS = "   ·   ", 185, 12
 _REASON_LETTERS = 160
+# Of pushed runs, and of those of which the window alone was looked at.
+_NONE = (
+    "No wall is steady from the softest one on that was tried.",
+    "There is no wall, from the softest one on that was tried, on which no swing was seen.",
+)
+_STIFFEST = (
+    ("Stiffest steady wall", "Every softer one tried there is steady, too."),
+    ("Stiffest wall on which no swing was seen", "Nor was one on any softer one tried there."),
+)
 _UNPUSHED = "No run was pushed: the words are what its last half second shows, and say little of stability."
 
 
 def description(data: MapData, cells: Cells) -> str:
     """Returns one line: the base scene, what was swept, the seeds, and how many cells came to which verdict."""
-    words = [f"{count} {verdict_words(number)}" for number, count in cells.count().items()]
+    words = [f"{count} {data.word(number)}" for number, count in cells.count().items()]
     if missing := int((cells.verdict == NOT_RUN).sum()):
         words.append(f"{missing} not run yet")
     counted = f"{cells.verdict.size} cells: " if cells.verdict.size > 1 else ""
@@ -66,12 +74,13 @@ def _answer(data: MapData, cells: Cells) -> str:
     if not any(axis.key == STIFFNESS for axis in axes):
         return ""
     if found is None:
-        return "No wall is steady from the softest one on that was tried."
+        return _NONE[data.is_unpushed]
     others = _place(pair for pair in zip(axes, found.index, strict=True) if pair[0].key != STIFFNESS)
-    more = "No stiffer one was tried." if found.open_end else "Every softer one tried there is steady, too."
+    stiffest, softer = _STIFFEST[data.is_unpushed]
+    more = "No stiffer one was tried." if found.open_end else softer
     told = data.provisos(int(cells.row[found.index]))
     yet = f" Yet: {', '.join(told)}." if told else ""
-    return f"★ Stiffest steady wall: {spring(found.value)}{others}. {more}{yet}"
+    return f"★ {stiffest}: {spring(found.value)}{others}. {more}{yet}"
 
 
 def _provisos(data: MapData) -> str:

@@ -7,7 +7,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, empty_figure, fit_text
-from haploop.tools.sweep.map.looks import AMPLITUDES, amplitude_colours, metres_along
+from haploop.tools.sweep.map.looks import amplitude_colours, metres_along
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -79,11 +79,11 @@ class Column:
             text.set_gid("legend")
         self._go_below(made)
 
-    def amplitudes(self, scale: LogNorm) -> None:
-        """Draws the colours of the limit cycles."""
+    def amplitudes(self, scale: LogNorm, word: str) -> None:
+        """Draws the colours of what swings, by its word."""
         from matplotlib.cm import ScalarMappable
 
-        self._write(AMPLITUDES, TEXT, INK)
+        self._write(f"{word}: swing, peak to peak", TEXT, INK)
         bottom = self._top - _BAR_IN / self._height_in
         bar = self._side.add_axes((0.02, bottom, 0.86, _BAR_IN / self._height_in))
         self._side.figure.colorbar(ScalarMappable(scale, amplitude_colours()), cax=bar, orientation="horizontal")

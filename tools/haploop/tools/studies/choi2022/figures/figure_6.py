@@ -26,6 +26,7 @@ from haploop.tools.figure.style import (
 )
 from haploop.tools.figure.time import line
 from haploop.tools.linear.one_tick import OneTickMap
+from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount
 from haploop.tools.search.random import Point
 from haploop.tools.studies.choi2022.figures.claims import HOLDS, RARE_BELOW, Finding
@@ -220,7 +221,7 @@ def _panels(runs: Mapping[str, Run]) -> Figure:
     ends = []
     for column, (panel, (scene, summary, log)) in zip(axes.T, runs.items(), strict=True):
         surface, t, mm = 1e3 * wall_of(scene).position, log["/plant"]["t"], 1e3 * log["/plant"]["x"]
-        _position(column[0], surface, t, mm, f"{_PANELS[panel]}: {summary['verdict']}")
+        _position(column[0], surface, t, mm, f"{_PANELS[panel]}: {told(summary)}")
         _force(column[1], log)
         _energy(column[2], log)
         ends.append(mm[t >= t[-1] / 2.0])
