@@ -159,6 +159,7 @@ holds = "stedy"
         "axes.wall.stifness is not a key of [wall]; did you mean stiffness?",
         'axes.dissipation.0.damping.to is "10 kg". kg is a mass',
         "axes.clock.round_trip_delay.1 is nan. It must be a finite number of s.",
+        'bisect is { axis = "wall.stifness", holds = "stedy" }. It must have exactly one of tolerance and relative.',
         'bisect.holds is "stedy"; did you mean steady?',
     ]
     assert len(found) == len(expected)

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import haploop.launch
+from haploop.protocol.names import nearest
 
 FOLDERS = ("scenes", "devices", "hands", "sweeps")
 
@@ -43,6 +44,17 @@ def found(path: Path, folder: str, beside: Path = Path()) -> Path:
         if os.path.exists(file) and not os.path.isdir(file):  # noqa: PTH110, PTH112 (false, not an error, for any name)
             return file
     return of_name(path.as_posix(), folder) or own
+
+
+def like(name: str, folder: str, beside: Path = Path()) -> str | None:
+    """Returns what a name that is none may have been meant for: a bundled one, or a file of one's own ``beside`` it.
+
+    The nearest counts, else the first that begins as it does.
+    """
+    own = {path.stem: path.name for path in sorted(beside.glob("*.toml"))}
+    names = {one: one for one in bundled(folder)} | own
+    meant = nearest(name, names) or next((one for one in names if name and one.startswith(name)), None)
+    return names[meant] if meant else None
 
 
 def own_file(name: str, folder: str) -> Path | None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from haploop.controller.dissipation import Element
-from haploop.launch.scene.bundled import bundled, found
+from haploop.launch.scene.bundled import bundled, found, like
 from haploop.launch.scene.file import resolved
 from haploop.launch.scene.layers import Layers, read_layers
 from haploop.protocol.changes import Change, at_work
@@ -180,7 +180,10 @@ def _device(name: str) -> Path:
     if path.suffix == ".toml" or path.is_file() or (path.exists() and name not in known):
         return path
     if name not in known:
-        raise InvalidRequest(_unknown("DEVICE", name, list(known), "the path of a file with a device or a scene"))
+        meant = like(path.name, "devices", path.parent)
+        raise InvalidRequest(
+            _unknown("DEVICE", name, list(known), "the path of a file with a device or a scene", meant)
+        )
     return known[name]
 
 
@@ -212,7 +215,7 @@ def _lay_estimator(layers: Layers, name: str) -> None:
     layers.lay(ESTIMATORS[name], "--estimator")
 
 
-def _unknown(what: str, name: str, allowed: list[str], other: str) -> str:
-    meant = nearest(name, allowed)
+def _unknown(what: str, name: str, allowed: list[str], other: str, meant: str | None = None) -> str:
+    meant = meant or nearest(name, allowed)
     hint = f"; did you mean {meant}?" if meant else "."
     return f"{what} {name!r} is unknown{hint} Allowed: {', '.join(allowed)}{f', or {other}' if other else ''}."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,7 +16,7 @@ from haploop.launch.runs.loaded_scene import texts
 from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.bundled import found
 from haploop.launch.scene.check import complain
-from haploop.launch.scene.layers import KeyPath, Layers, key_path, lay_overrides
+from haploop.launch.scene.layers import KeyPath, Layers, key_path, lay_overrides, read_layers
 from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError, shown
 from haploop.launch.scene.models import Model
 from haploop.launch.scene.number import Number, si
@@ -35,6 +36,7 @@ from haploop.tools.sweep.record import make_columns, usual
 from haploop.tools.sweep.table import Column
 
 MOST_AXES = 3
+_KINDS_UNLESS_GIVEN = {"wall": "spring"}
 Verdict = Literal["steady", "limit-cycle", "diverged", "no-contact", "no-swing-seen", "swinging"]
 
 
@@ -85,14 +87,15 @@ class _Reader:
         self._data = self._layers.data
         given = self._data.get("set")
         self._changes: Values = given if isinstance(given, dict) else {}
+        # By the key of each axis what reads its values, where they are numbers.
+        self._numbers = dict[str | None, Number | None]()
 
     def sweep(self, overrides: Sequence[str]) -> Sweep:
         """Makes the sweep."""
         table, base = self._table(), self._base(overrides)
-        shape = base or self._unchanged()
-        axes = self._axes(shape)
-        record = self._record(shape, axes)
-        bisect = self._bisect(table.bisect, axes) if table and table.bisect else None
+        axes = self._axes(Layers(self._layers.path, base.as_dict()) if base else self._as_written())
+        record = self._record(base or self._unchanged(), axes)
+        bisect = self._bisect(axes)
         if bisect and base and base.run.verdict == "window":  # of which no run is called steady
             bisect = replace(bisect, holds=OF_WINDOW.get(bisect.holds, bisect.holds))
         if self._layers.mistakes or table is None or base is None:
@@ -139,7 +142,21 @@ class _Reader:
         except (SceneError, LookupError, TypeError):
             return None
 
-    def _axes(self, base: Scene | None) -> list[Axis]:
+    def _as_written(self) -> Layers | None:
+        """Returns the scene as its files and ``set`` have it, where something is wrong with it; None of no tables."""
+        name, table = self._data.get("scene"), self._data.get("base")
+        with suppress(SceneError, TypeError):
+            layers = Layers(self._layers.path, deepcopy(table)) if isinstance(table, dict) else None
+            layers = read_layers(self._scene_path(name)) if isinstance(name, str) else layers
+            if layers:
+                lay_overrides(layers, texts(self._changes))
+                for key, kind in _KINDS_UNLESS_GIVEN.items():
+                    if isinstance(one := layers.data.get(key), dict):
+                        one.setdefault("kind", kind)
+            return layers
+        return None
+
+    def _axes(self, base: Layers | None) -> list[Axis]:
         given = self._data.get("axes")
         if not isinstance(given, dict):
             return []
@@ -148,11 +165,11 @@ class _Reader:
         whole = base and self._with_first_names(base)
         return [axis for key, values in given.items() if whole and (axis := self._axis(key, values, whole))]
 
-    def _with_first_names(self, base: Scene) -> Layers:
+    def _with_first_names(self, base: Layers) -> Layers:
         """Returns the base with the first name or table of each such axis, which may bring the keys of another axis."""
         firsts = {key: values[0] for key, values in self._data["axes"].items() if isinstance(values, list) and values}
         names = {key: value for key, value in firsts.items() if not isinstance(value, int | float) and key_path(key)}
-        layers = Layers(self._layers.path, base.as_dict())
+        layers = Layers(self._layers.path, base.data)
         with suppress(TypeError):  # a value that no scene holds, which is a mistake of its axis
             lay_overrides(layers, texts(names))
         return layers
@@ -169,7 +186,7 @@ class _Reader:
         try:
             if not path:
                 raise AxisError("It must be a dotted key, such as wall.stiffness.", "cannot be read")
-            number = number_at(path, scene, self._kinds)
+            number = self._numbers[key] = number_at(path, scene, self._kinds)
             points = self._points(at, values, number)
         except AxisError as error:
             place = at if error.place == "" else (*at, error.place)
@@ -225,30 +242,38 @@ class _Reader:
 
         return make_columns(names, Sweep("", base, tuple(axes), sources=self._sources), self._kinds, complain)
 
-    def _bisect(self, given: BisectTable, axes: Sequence[Axis]) -> Bisect | None:
-        axis = next((axis for axis in axes if axis.key == given.axis), None)
-        if axis is None or axis.unit is None or axis.whole or len(axis.values) < 2:
-            if given.axis not in (keys := list(self._data["axes"])):
-                sentence = f"It must be an axis: {', '.join(keys)}."
-                self._layers.complain(("bisect", "axis"), sentence, None, nearest(given.axis, keys))
-            elif axis:
-                self._layers.complain(
-                    ("bisect", "axis"), "It must be an axis of two or more numbers that need not be whole."
-                )
+    def _bisect(self, axes: Sequence[Axis]) -> Bisect | None:
+        """Returns the bisection; None where there is none, or it cannot be made: what the model of its table says is
+        told already."""
+        given = self._data.get("bisect")
+        if not isinstance(given, dict) or not isinstance(key := given.get("axis"), str):
             return None
-        steps = {b > a for a, b in zip(axis.values, axis.values[1:], strict=False)}
-        if len(steps) > 1:
-            self._layers.complain(("axes", axis.key), "The values of the axis that is bisected must go one way.")
-        if (given.tolerance is None) == (given.relative is None):
+        mistakes, place = len(self._layers.mistakes), ("bisect", "axis")
+        keys = list(self._data["axes"]) if isinstance(self._data.get("axes"), dict) else []
+        axis = next((axis for axis in axes if axis.key == key), None)
+        if key not in keys:
+            self._layers.complain(place, f"It must be an axis: {', '.join(keys)}.", None, nearest(key, keys))
+        elif axis and (axis.unit is None or axis.whole or len(axis.values) < 2):
+            self._layers.complain(place, "It must be an axis of two or more numbers that need not be whole.")
+        elif axis and len({b > a for a, b in zip(axis.values, axis.values[1:], strict=False)}) > 1:
+            self._layers.complain(("axes", key), "The values of the axis that is bisected must go one way.")
+        tolerance_given, relative = given.get("tolerance"), given.get("relative")
+        if (tolerance_given is None) == (relative is None):
             self._layers.complain(("bisect",), "It must have exactly one of tolerance and relative.")
+        tolerance = self._tolerance(tolerance_given, self._numbers.get(key) or self._numbers.get(nearest(key, keys)))
+        if len(self._layers.mistakes) > mistakes or axis is None or not isinstance(relative, float | int | None):
             return None
-        tolerance = 0.0
-        if given.tolerance is not None:
-            try:
-                tolerance = Number(Quantity(axis.unit, above=0.0)).read(given.tolerance)
-            except PydanticCustomError as error:
-                self._layers.complain(("bisect", "tolerance"), error.message())
-        return Bisect(axis.key, given.holds, Tolerance(tolerance, given.relative or 0.0))
+        return Bisect(key, given.get("holds", "steady"), Tolerance(tolerance, float(relative or 0.0)))
+
+    def _tolerance(self, given: Any, number: Number | None) -> float:
+        """Returns the tolerance in the unit of its axis; 0 where it is none or wrong, or that axis is not known."""
+        if given is None or number is None:
+            return 0.0
+        try:
+            return Number(Quantity(number.quantity.unit, above=0.0)).read(given)
+        except PydanticCustomError as error:
+            self._layers.complain(("bisect", "tolerance"), error.message())
+            return 0.0
 
 
 def _complain(layers: Layers, error: ValidationError, model: type[Model], title: str) -> None:

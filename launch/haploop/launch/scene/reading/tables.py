@@ -7,11 +7,10 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from haploop.launch.scene.bundled import bundled
+from haploop.launch.scene.bundled import bundled, like
 from haploop.launch.scene.mistakes import Mistake, SceneError, shown
 from haploop.launch.scene.reading.lines import outline
 from haploop.protocol.files import read_text
-from haploop.protocol.names import nearest
 from haploop.protocol.scene.table import Tables
 
 # No scene needs tables deeper in one another than this, nor more keys outside of lists; a thousand of them would end
@@ -98,10 +97,13 @@ def _with_the_first(path: Path, text: str, doubled: list[Mistake]) -> Tables | N
 
 
 def _absent(path: Path, what: str) -> str:
-    """Returns the sentence on a file that is not there; its name may have been meant for a bundled one."""
-    meant = nearest(path.stem, bundled(f"{what}s"))
+    """Returns the sentence on a file that is not there; its name may have been meant for another, or for a scene."""
+    meant = like(path.stem, f"{what}s", path.parent)
     hint = f", and no {what} of that name comes with haploop" if path.name == str(path) else ""
-    return f"There is no such file{hint}{f'; did you mean {meant}?' if meant else '.'}"
+    words = f"There is no such file{hint}{f'; did you mean {meant}?' if meant else '.'}"
+    if what != "scene" and path.stem in bundled("scenes"):
+        words += f" {path.stem} is a scene: haploop run {path.stem}."
+    return words
 
 
 _TOO_DEEP = f"Tables and lists may lie at most {DEEPEST} deep in one another."

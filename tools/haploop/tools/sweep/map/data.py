@@ -191,7 +191,7 @@ class MapData:
 
 def verdict_number(word: str | None) -> int:
     """Returns the place of a verdict in ``VERDICTS``, of a window's that of its like; a run without one failed."""
-    word = _LIKE.get(word, word)
+    word = _LIKE.get(word, word) if word else word
     return VERDICTS.index(word) if word in VERDICTS else Verdict.FAILED
 
 
