@@ -93,6 +93,26 @@ def test_samples_that_repeat_in_mid_motion_are_counted_and_a_device_at_rest_is_n
     assert any("repeat the one before" in sentence for sentence in note_sentences(found))
 
 
+@pytest.mark.parametrize("period", [1.25, 2.0, 3.0])
+def test_of_a_sensor_that_is_read_faster_than_it_measures_the_repeats_are_counted(
+    tmp_path: Path, period: float
+) -> None:
+    t = np.arange(3000.0) * 1e-3
+    measured_s = np.floor(np.arange(3000.0) / period + 1e-9) * period * 1e-3
+    x = np.round(2e-3 * np.sin(2.0 * np.pi * 8.0 * measured_s) / 1e-6) * 1e-6
+    found = outcome(write(tmp_path / "slow_sensor.csv", {"t": t, "x": x}))
+    assert found.recording.notes.repeated > 0.5 * 3000.0 * (1.0 - 1.0 / period)
+
+
+@pytest.mark.parametrize("frequency_Hz", [15.0, 41.0, 97.0])
+def test_a_motion_that_is_rounded_where_it_turns_or_creeps_repeats_nothing(tmp_path: Path, frequency_Hz: float) -> None:
+    t = np.arange(3000.0) * 1e-3
+    for noise in (0.0, 0.5, 1.0):
+        motion = 2.7e-4 * np.sin(2.0 * np.pi * frequency_Hz * t) + 2e-3 * np.sin(2.0 * np.pi * 0.7 * t)
+        x = np.round(motion / 1e-5 + noise * np.random.default_rng(1).standard_normal(len(t))) * 1e-5
+        assert outcome(write(tmp_path / "rounded.csv", {"t": t, "x": x})).recording.notes.repeated == 0
+
+
 def test_uneven_times_are_counted_and_change_nothing(plain: Path, tmp_path: Path) -> None:
     t = T + 3e-4 * np.sin(np.arange(200.0) * 1.3)
     path = write(tmp_path / "uneven.csv", {"t": t, "x": X})

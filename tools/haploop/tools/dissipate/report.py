@@ -62,8 +62,9 @@ _COUNTS = {
     "unusable_rows": "Rows left out, since a number in them is missing or not finite: {count}.",
     "bridged": "Single missing samples, taken as the mean of their neighbours: {count}.",
     "repeated": (
-        "Samples that repeat the one before in mid-motion: {count} ({percent:.2g} %), as where a sensor is read faster "
-        "than it measures. Each looks like a stop and a jump, in which an inertia seems to generate energy."
+        "Samples that repeat the one before in mid-motion, at even intervals: {count} ({percent:.2g} %), as where a "
+        "sensor is read faster than it measures. Each looks like a stop and a jump, in which an inertia seems to "
+        "generate energy."
     ),
     "uneven": (
         "Periods more than a tenth off the others: {count}. Estimates take them for equal, as a controller does "

@@ -64,7 +64,8 @@ class Notes:
     Attributes:
         gaps_s: begin and end of each gap, s; the first hundred.
         bridged: single samples that were missing and are the mean of their neighbours.
-        repeated: samples equal to the one before although the device moved, by three counts or more, before and after.
+        repeated: samples equal to the one before although the device moved on, by three counts or more, before and
+            after, where they come at even intervals.
         uneven: periods that are more than a tenth off the others, or than rounding makes them.
         rounded_s: the step to which times are rounded that are even but for that, s; 0 where nothing of it is seen.
     """

@@ -12,6 +12,7 @@ import numpy as np
 from haploop.launch.scene.units import scale_of
 from haploop.tools.dissipate.recording.delimited import Column, DelimitedFile
 from haploop.tools.dissipate.recording.plausible import Largest
+from haploop.tools.dissipate.recording.repeats import repeats
 from haploop.tools.dissipate.recording.samples import Floats, Notes, RecordingError, Samples
 from haploop.tools.dissipate.recording.stamps import ONE_MISSING, Flags, Stamps, is_late, stamps
 
@@ -29,8 +30,6 @@ _FAR_APART_S = 0.1
 _IN_METRES = ("position_m", "x_m")
 # Periods above which there is a gap between two samples; deviation above which a period is uneven.
 _GAP, _UNEVEN = 1.5, 0.1
-# Steps before and after a sample that repeats the one before, in counts: a device this fast does not stand still.
-_MOVING_COUNTS = 3.0
 # No quantity of a device is greater, in SI units.
 _MOST = 1e10
 # Positions without a unit that are further apart, m, are asked after, or said to be taken for metres.
@@ -196,7 +195,7 @@ class TextRecording:
                 part = {name: column[first:end] for name, column in columns.items()}
                 x, v, a, force = (part.get(name) for name in ("position", "velocity", "acceleration", "force"))
                 assert x is not None
-                self._note_repeats(x)
+                self.notes.repeated += repeats(x)
                 largest.add(part)
                 begins = bool(is_gap[first])
                 unknown = self._unknown if begins and (first or last_s is not None) else 0
@@ -254,13 +253,6 @@ class TextRecording:
                     f"Line {lines[at]:.0f} of {self._file.path}: no {name} of a device is {column[at]:.3g} in SI "
                     "units; give the unit that is meant."
                 )
-
-    def _note_repeats(self, x: Floats) -> None:
-        step = np.abs(np.diff(x))
-        if not step.any() or len(step) < 3:
-            return
-        fast = step >= _MOVING_COUNTS * step[step > 0.0].min()
-        self.notes.repeated += int(((step[1:-1] == 0.0) & fast[:-2] & fast[2:]).sum())
 
     def _refuse_disorder(self, t: Floats, steps: Floats, lines: Floats, last_s: float | None) -> None:
         wrong = np.flatnonzero(steps <= 0.0)
