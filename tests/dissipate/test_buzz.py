@@ -257,6 +257,24 @@ def test_of_a_short_slow_or_broken_recording_it_cannot_be_said() -> None:
     assert found.word() == "cannot say"
 
 
+def test_of_a_swing_within_the_counts_it_is_said_that_they_decide_and_not_that_it_is_not_felt(tmp_path: Path) -> None:
+    x = swing(200.0, 8e-6) + 1e-3 * S
+    coarse = outcome(write(tmp_path / "coarse.csv", {"t": S, "x": np.round(x / 1e-5) * 1e-5}))
+    said = shown(make_report(coarse), 600)
+    assert "cannot be said: a swing at 200." in said
+    assert "within 2 counts of the positions, 10.0 µm each" in said
+    assert "No swing" not in said
+    assert coarse.as_data()["hidden"]["count_m"] == pytest.approx(1e-5)
+    fine = outcome(write(tmp_path / "fine.csv", {"t": S, "x": np.round(x / 1e-6) * 1e-6}))
+    assert (fine.buzz_word, fine.hidden) == ("buzzes", None)
+    for beside in (3e-3 * np.sin(2.0 * np.pi * 0.7 * S), 1e-3 * S):
+        path = write(tmp_path / "beside.csv", {"t": S, "x": np.round((swing(200.0, 8e-6) + beside) / 1e-5) * 1e-5})
+        assert outcome(path).buzz_word == "cannot say"
+    for speed_m_s in (1e-4, 7e-4, 2e-3, 5e-3):
+        creeps = outcome(write(tmp_path / "creeps.csv", {"t": S, "x": np.round(speed_m_s * S / 1e-5) * 1e-5}))
+        assert (creeps.buzz_word, creeps.hidden) == ("none seen", None)
+
+
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
     return write(tmp_path / "buzz.csv", {"t": S, "x": counted(swing(31.0, 2.6e-4) * (S > 2.0) - 1e-3 * S)})

@@ -16,6 +16,7 @@ from haploop.tools.dissipate.recording.samples import Floats, LogRecording
 from haploop.tools.dissipate.recording.text_recording import TextRecording
 from haploop.tools.dissipate.swing.buzz import Buzz, Overtone, Several, Word
 from haploop.tools.dissipate.swing.finder import BuzzFinder
+from haploop.tools.dissipate.swing.hidden import Hidden
 from haploop.tools.dissipate.trace import Trace
 from haploop.tools.render.units import amount
 from haploop.view.look.spectrum import Line
@@ -97,6 +98,7 @@ class Outcome:
         left_out: a line that was taken for the shape of a slower motion, where no buzz was seen.
         several: swings at several frequencies at once, where there was no buzz at one.
         fast_rms_m: by how much it moves above 15 Hz, r.m.s., for a second or more.
+        hidden: a swing within the counts of the positions, because of which it cannot be said whether it buzzes.
         slower: a swing at one frequency from some 3 Hz up to that of a buzz, where no buzz was seen.
     """
 
@@ -113,6 +115,7 @@ class Outcome:
     several: Several | None = None
     slower: Buzz | None = None
     fast_rms_m: float = 0.0
+    hidden: Hidden | None = None
     tried: tuple[ElementOutcome, ...] = ()
 
     @property
@@ -154,6 +157,7 @@ class Outcome:
             "several": self.several and self.several._asdict(),
             "slower": _buzz_data(self.slower),
             "fast_rms_m": self.fast_rms_m,
+            "hidden": self.hidden and self.hidden._asdict(),
             "left_out": self.left_out and self.left_out.line._asdict() | {"slower_Hz": self.left_out.slower_Hz},
             "main_Hz": self.main_Hz,
             "samples": notes.pop("rows"),
@@ -227,6 +231,7 @@ def make_outcome(
         several,
         None if buzz or several or not found.slower else found.slower.buzz(),
         found.fast_rms_m(),
+        None if buzz or several else found.hidden.found,
     )
 
 

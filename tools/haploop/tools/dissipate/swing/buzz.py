@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
+from haploop.tools.dissipate.swing.course import Course
 from haploop.tools.dissipate.swing.fed import LEAST_FED
 from haploop.view.look.spectrum import Line
 
@@ -62,9 +63,13 @@ class Buzz:
         least_Hz, most_Hz: of the windows.
         spans: of each stretch, its ends a fifth of a second at most too early or late.
         width_m: of the widest window, peak to peak, of the sine at its frequency: to 1 % and a tenth of a count beside
-            a drift, to 3 % beside a hand's motion fifteen times as wide. Overtones may add some percent.
-        first_m, last_m: widths of the third window, which it fills, and of the last, or the last but two where it ends
-            before the recording does.
+            a drift, to 3 % beside a hand's motion fifteen times as wide. Overtones may add some percent. Where it
+            changes within a window, that of its widest three periods, to some 5 %.
+        course: whether it stayed as wide, or grew or died down all the way but for little, by a fifth at least; else
+            its width varied, as that of two buzzes does that are too close to be told apart; None of several stretches.
+        first_m, last_m: widths where it begins and ends; where it stayed as wide those of the third window, which it
+            fills, and of the last, or the last but two where it ends before the recording does.
+        least_m: least width of what it fills.
         fed_W: mean power that a recorded force gave to the swing with its overtones, where it fills a window; negative
             where it took; None where none was recorded.
         moved_W: mean of what it would be were force and velocity in phase.
@@ -76,8 +81,10 @@ class Buzz:
     most_Hz: float
     spans: tuple[Span, ...]
     width_m: float
+    course: Course | None
     first_m: float
     last_m: float
+    least_m: float
     fed_W: float | None = None
     moved_W: float = 0.0
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from haploop.tools.dissipate.recording.samples import Floats, Samples
@@ -19,9 +17,12 @@ from haploop.tools.dissipate.swing.buzz import (
     Span,
     Word,
 )
+from haploop.tools.dissipate.swing.course import course, widths
 from haploop.tools.dissipate.swing.fed import fed_W
-from haploop.tools.dissipate.swing.lines import Slower, fast_rms_m, is_overtone, overtone_of, swing
+from haploop.tools.dissipate.swing.hidden import HiddenFinder
+from haploop.tools.dissipate.swing.lines import Slower, fast_rms_m, is_overtone, overtone_of, swing, within_counts
 from haploop.tools.dissipate.swing.several import SeveralFinder
+from haploop.tools.dissipate.swing.windows import THIRD, End, Window, along_m, widest_m
 from haploop.view.look.spectrum import Line, main_line
 
 # The windows are a quarter of one apart; so many after the first have to swing as well for a swing to last.
@@ -34,23 +35,9 @@ _KEPT = 0.7
 # A gap of no more than this, after so many times as many samples without one, is bridged by a straight line: the swing
 # loses no more of its width than the gap is of a window.
 _BRIDGED_S, _BETWEEN = 0.01, 10
-
 # The first window that a swing fills which began within the first, by number; one before it is left out where it is
-# less than ``_KEPT`` as wide. Of those left the first and the last may be empty for about a quarter; the third is full.
-_FULL, _THIRD = _HOPS - 1, 2
-
-
-class _Window(NamedTuple):
-    """A window that swings.
-
-    Attributes:
-        from_s, to_s: where the swing began if this is the first of its stretch, and ended if it is the last.
-    """
-
-    from_s: float
-    to_s: float
-    line: Line
-    fed: tuple[float, float] | None
+# less than ``_KEPT`` as wide.
+_FULL = _HOPS - 1
 
 
 class BuzzFinder:
@@ -64,21 +51,22 @@ class BuzzFinder:
         longest_s: the longest part without a gap that is not bridged.
         slow: the widest line slower than the band; None of a motion without one.
         slower: beside a buzz, the search for a swing just slower than that.
+        hidden: swings that are no wider than a staircase of counts may be.
     """
 
     def __init__(self, period_s: float, delay_s: float = 0.0, band: Band = FAST) -> None:
         self._delay_s, self._band = delay_s, band
         self._size = max(4, round(band.window_s / period_s))
-        self._several = SeveralFinder()
+        self._several, self.hidden = SeveralFinder(), HiddenFinder(band)
         self.slower = BuzzFinder(period_s, delay_s, SLOWER) if band is FAST else None
         self.rate_Hz = 1.0 / period_s
         self._t_s, self._motion = np.empty(0), np.empty((3, 0))
         self._begins_s = self.longest_s = 0.0
         self.slow: Line | None = None
         # Windows that swing, in stretches without one that does not or has another frequency.
-        self._stretches: list[list[_Window]] = [[]]
+        self._stretches: list[list[Window]] = [[]]
         # Of the last window of a part without a gap, where a swing that ends in it did -> the end of the part.
-        self._part_ends_s = dict[float, float]()
+        self._part_ends = dict[float, End]()
         # Where in what is kept, which begins with the last window, the next one does.
         self._next = 0
         # Samples since the last gap, bridged or not.
@@ -94,12 +82,13 @@ class BuzzFinder:
         missing = self._bridged(float(piece.t_s[0])) if piece.begins else 0
         self._whole = len(piece.t_s) + (0 if piece.begins else self._whole)
         if piece.begins and not missing:
-            self._part_ends_s |= self._end_of_part()
+            self._part_ends |= self._end_of_part()
             self._next = 0
             self._t_s, self._motion = np.empty(0), np.empty((3, 0))
             self._begins_s = float(piece.t_s[0])
             self._stretches.append([])
             self._several.part()
+            self.hidden.end()
             self._fast_m.append(0.0)
         line = main_line(piece.x_m, self.rate_Hz)
         if line and line.frequency_Hz < self._band.above_Hz and (self.slow is None or line.width > self.slow.width):
@@ -133,6 +122,11 @@ class BuzzFinder:
         inside_s = (to_s - from_s) / _HOPS
         rate_Hz = (len(t_s) - 1) / (to_s - from_s)
         line = swing(x_m, rate_Hz, self._band)
+        if line and (count_m := within_counts(line, x_m)):
+            self.hidden.look(line, count_m)
+            line = None
+        else:
+            self.hidden.end()
         if self._band is FAST:
             self._fast_m.append(fast_rms_m(x_m, rate_Hz))
             self._several.look(from_s if from_s == self._begins_s else from_s + inside_s, to_s - inside_s, x_m, rate_Hz)
@@ -144,11 +138,13 @@ class BuzzFinder:
             last = []
             self._stretches.append(last)
         if line:
-            begins_s = from_s if from_s == self._begins_s else from_s + inside_s
+            begins = from_s == self._begins_s
             fed = None if np.isnan(force_N).any() else fed_W(true_x_m, force_N, rate_Hz, line.frequency_Hz, delay_s)
-            last.append(_Window(begins_s, to_s - inside_s, line, fed))
+            along = widths(x_m, rate_Hz, line.frequency_Hz)
+            begins_s, width_m = from_s if begins else from_s + inside_s, widest_m(line, along, begins)
+            last.append(Window(begins_s, to_s - inside_s, line, fed, (from_s, to_s - from_s), along, width_m))
 
-    def _end_of_part(self) -> dict[float, float]:
+    def _end_of_part(self) -> dict[float, End]:
         """Returns the end of this part, by that of its last window, where it swings on to there; else nothing.
 
         The windows end up to a quarter of one earlier.
@@ -156,10 +152,20 @@ class BuzzFinder:
         if not (last := self._stretches[-1]) or not self._next:
             return {}
         t_s, x_m = self._t_s[-self._size :], self._motion[0, -self._size :]
-        line, before = swing(x_m, (len(t_s) - 1) / float(t_s[-1] - t_s[0]), self._band), last[-1].line
-        if line is None or abs(line.frequency_Hz - before.frequency_Hz) >= self._band.resolved_Hz:
+        lasts_s = float(t_s[-1] - t_s[0])
+        rate_Hz = (len(t_s) - 1) / lasts_s
+        line, before = swing(x_m, rate_Hz, self._band), last[-1].line
+        if (
+            line is None
+            or within_counts(line, x_m)
+            or abs(line.frequency_Hz - before.frequency_Hz) >= self._band.resolved_Hz
+        ):
             return {}
-        return {last[-1].to_s: float(t_s[-1])} if line.width >= _GOES_ON * before.width else {}
+        if line.width < _GOES_ON * before.width:
+            return {}
+        along = widths(x_m, rate_Hz, line.frequency_Hz)
+        width_m = widest_m(line, along, ends=True)
+        return {last[-1].to_s: End(float(t_s[-1]), (float(t_s[0]), lasts_s), along, width_m)}
 
     def buzz(self) -> Buzz | None:
         """Returns the buzz; None where there was none, or nothing can be said.
@@ -173,7 +179,7 @@ class BuzzFinder:
         swings_Hz = [window.line.frequency_Hz for window in kept]
         least_Hz, most_Hz, width_m = min(swings_Hz), max(swings_Hz), max(window.line.width for window in kept)
 
-        def is_alike(window: _Window) -> bool:
+        def is_alike(window: Window) -> bool:
             near_Hz = self._band.resolved_Hz
             is_near = least_Hz - near_Hz < window.line.frequency_Hz < most_Hz + near_Hz
             return is_near and window.line.width >= _KEPT * width_m
@@ -183,31 +189,47 @@ class BuzzFinder:
         fed = [window.fed for window in told if window.fed is not None]
         given_W, moved_W = np.mean(fed, axis=0).tolist() if fed else (None, 0.0)
         # What still swings at the end of a part goes on to it.
-        ends_s = self._part_ends_s | self._end_of_part()
+        ends = self._part_ends | self._end_of_part()
+        spans = self._joined(told, ends)
+        last = told[-1 if told[-1].to_s in ends else -min(THIRD + 1, len(told))]
+        width_m, word = max(span.width_m for span in spans), None
+        first_m, last_m = told[min(THIRD, len(told) - 1)].line.width, last.line.width
+        least_m = min(window.line.width for window in told)
+        if len(spans) == 1:
+            found_m, error_m = along_m(told, ends)
+            word = course(found_m, error_m)
+            width_m = max(window.line.width for window in told)
+            if word != "stayed":
+                first_m, last_m, least_m = found_m[0], found_m[-1], found_m.min()
+                width_m = max(width_m, found_m.max())
+            spans = (spans[0]._replace(width_m=float(width_m)),)
         return Buzz(
             float(np.median(swings_Hz)),
             0.5 * self._band.resolved_Hz,
             least_Hz,
             most_Hz,
-            self._joined(told, ends_s),
-            width_m,
-            told[min(_THIRD, len(told) - 1)].line.width,
-            told[-1 if told[-1].to_s in ends_s else -min(_THIRD + 1, len(told))].line.width,
+            spans,
+            float(width_m),
+            word,
+            float(first_m),
+            float(last_m),
+            float(least_m),
             given_W,
             moved_W,
         )
 
-    def _joined(self, told: list[_Window], ends_s: dict[float, float]) -> tuple[Span, ...]:
+    def _joined(self, told: list[Window], ends: dict[float, End]) -> tuple[Span, ...]:
         """Joins windows of about one frequency; no pause shorter than a window is told."""
         spans = list[Span]()
         last_Hz = 0.0
         for window in told:
-            to_s, (at_Hz, width_m, _) = ends_s.get(window.to_s, window.to_s), window.line
+            end, at_Hz = ends.get(window.to_s), window.line.frequency_Hz
+            to_s, width_m = end.to_s if end else window.to_s, max(window.width_m, end.width_m if end else 0.0)
             is_near = spans and window.from_s <= spans[-1].to_s + self._band.window_s
             if is_near and abs(at_Hz - last_Hz) < self._band.resolved_Hz:
                 from_s, until_s, least_Hz, most_Hz, widest_m = spans[-1]
-                ends = max(until_s, to_s), min(least_Hz, at_Hz), max(most_Hz, at_Hz), max(widest_m, width_m)
-                spans[-1] = Span(from_s, *ends)
+                joined = max(until_s, to_s), min(least_Hz, at_Hz), max(most_Hz, at_Hz), max(widest_m, width_m)
+                spans[-1] = Span(from_s, *joined)
             else:
                 spans.append(Span(window.from_s, to_s, at_Hz, at_Hz, width_m))
             last_Hz = at_Hz
@@ -221,13 +243,13 @@ class BuzzFinder:
             found.append(Slower(line, 0.5 * (of.most_Hz - of.least_Hz)))
         return found
 
-    def _parted(self) -> tuple[list[list[_Window]], list[Overtone]]:
+    def _parted(self) -> tuple[list[list[Window]], list[Overtone]]:
         """Returns of each stretch the part that lasts, and what was left out for an overtone of a slower motion."""
         slower = self._slower()
         parts = [self._lasting(stretch, slower) for stretch in self._stretches]
         return [kept for kept, _ in parts if kept], [*self._left_out, *(one for _, left in parts for one in left)]
 
-    def _lasting(self, stretch: list[_Window], slower: list[Slower]) -> tuple[list[_Window], list[Overtone]]:
+    def _lasting(self, stretch: list[Window], slower: list[Slower]) -> tuple[list[Window], list[Overtone]]:
         """Returns the part of a stretch that lasts without decaying; what is an overtone of the motion by itself."""
         widths = [window.line.width for window in stretch]
         decays = [widths[i + _NEEDED] < _KEPT * max(widths[i : i + _NEEDED]) for i in range(len(widths) - _NEEDED)]
@@ -262,10 +284,12 @@ class BuzzFinder:
             return "buzzes"
         if self.several():
             return "buzzes at several frequencies"
+        if self.hidden.found:
+            return "cannot say"
         return "none seen" if self.longest_s >= LASTS_S - 1e-9 and self.rate_Hz >= LEAST_RATE_HZ else "cannot say"
 
 
-def _filled(stretch: list[_Window]) -> list[_Window]:
+def _filled(stretch: list[Window]) -> list[Window]:
     """Returns a stretch without the windows at its beginning of which the swing fills a part."""
     widths = [window.line.width for window in stretch]
     first = next((i for i, width in enumerate(widths) if width >= _KEPT * widths[min(_FULL, len(widths) - 1)]), 0)

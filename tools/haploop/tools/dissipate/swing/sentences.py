@@ -8,7 +8,9 @@ from typing import Any
 from haploop.launch.stability.traces import is_felt
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.dissipate.swing.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, SLOWER, Buzz, Span, Word
+from haploop.tools.dissipate.swing.course import Course
 from haploop.tools.dissipate.swing.fed import LEAST_FED
+from haploop.tools.dissipate.swing.lines import COUNTS
 from haploop.tools.render.units import amount
 
 _BUZZ: dict[Word, str] = {
@@ -27,6 +29,10 @@ _BUZZ: dict[Word, str] = {
         "second."
     ),
 }
+_HIDDEN = (
+    "Whether the recording buzzes cannot be said: a swing at {at:.1f} Hz, {width} peak to peak, would be felt, but it "
+    "is within {counts} counts of the positions, {count} each, as their staircase may be. Record with a finer encoder."
+)
 _ONE_HZ, _MOVING_HZ = "{0:.1f} Hz (give or take {1:g} Hz)", "{0:.0f} to {1:.0f} Hz"
 # Of so many spans with frequencies of their own each is told.
 MOST_SPANS = 4
@@ -34,9 +40,12 @@ _SPAN = "{frequency} ({width}) from about {from_s:.1f} s to {to_s:.1f} s"
 _LINE = "{0:.1f} Hz, {1}"
 _NOT_FED = " What a recorded force gives to a swing is told of one at one frequency alone."
 _ONCE, _AGAIN = "from about {0:.1f} s to {1:.1f} s", "{0} times between about {1:.1f} s and {2:.1f} s, {3:.1f} s in all"
-_GREW, _DIED, _STAYED = " It grew from {0} to {1}.", " It died down from {0} to {1}.", " It stayed as wide."
-# It grew, or died down, by so much.
-_TELLS = 1.2
+_COURSE: dict[Course, str] = {
+    "grew": " It grew from {first} to {last}.",
+    "died down": " It died down from {first} to {last}.",
+    "stayed": " It stayed as wide.",
+    "varied": " Its width varied from {least} to {widest}.",
+}
 _FED = " Meanwhile the recorded force gave {energy} to this swing, {power}: it feeds it."
 _TAKEN = (
     " Meanwhile the recorded force took {energy} out of this swing, {power}: something else feeds it, unless the force "
@@ -97,6 +106,9 @@ def buzz_sentence(outcome: Outcome) -> str:
         limits["width"] = amount(several.width_m, "m")
         limits["when"] = _ONCE.format(several.from_s, several.to_s)
     words = _BUZZ[outcome.buzz_word].format(**limits)
+    if of := outcome.hidden:
+        told = {"at": of.frequency_Hz, "width": amount(of.width_m, "m"), "count": amount(of.count_m, "m")}
+        words = _HIDDEN.format(**told, counts=COUNTS)
     if outcome.buzz:
         sign_is_known = not outcome.force or outcome.force.passivity != "other sign"
         return words + _course(outcome.buzz) + _fed(outcome.buzz, sign_is_known)
@@ -110,9 +122,10 @@ def buzz_sentence(outcome: Outcome) -> str:
         words += _SLOWER.format(**limits | _told(outcome.slower))
     if (slow := outcome.slow) and not (outcome.slower and slow.frequency_Hz > SLOWER.above_Hz):
         words += _HAND.format(main=slow.frequency_Hz, width=amount(slow.width, "m"))
-    if not (of := outcome.left_out):
+    if not (left := outcome.left_out):
         return words
-    numbers = {"at": of.line.frequency_Hz, "width": amount(of.line.width, "m"), "order": of.order, "of": of.slower_Hz}
+    numbers = {"at": left.line.frequency_Hz, "width": amount(left.line.width, "m")}
+    numbers |= {"order": left.order, "of": left.slower_Hz}
     return words + _LEFT_OUT.format(**numbers)
 
 
@@ -157,11 +170,11 @@ def _frequency(span: Span, buzz: Buzz) -> str:
 
 
 def _course(buzz: Buzz) -> str:
-    """Returns whether a buzz of one stretch grows."""
-    if len(buzz.stretches) > 1:
+    """Returns what became of the width of a buzz of one stretch."""
+    if buzz.course is None:
         return ""
-    words = _GREW if buzz.last_m > _TELLS * buzz.first_m else _DIED if buzz.first_m > _TELLS * buzz.last_m else _STAYED
-    return words.format(amount(buzz.first_m, "m"), amount(buzz.last_m, "m"))
+    told = {"first": buzz.first_m, "last": buzz.last_m, "least": buzz.least_m, "widest": buzz.width_m}
+    return _COURSE[buzz.course].format(**{name: amount(width_m, "m") for name, width_m in told.items()})
 
 
 def _fed(buzz: Buzz, sign_is_known: bool) -> str:
