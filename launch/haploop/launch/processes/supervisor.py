@@ -40,9 +40,8 @@ if TYPE_CHECKING:
 # run, and programs that take the place of its own.
 Start = Callable[[Path, Callable[[str], Message], bool, int, Mapping[str, Program]], dict[str, Child]]
 
-# What the others are given to hand over their last blocks after a node has failed, and the logger to save its files
-# then; on a busy machine that takes its time.
-_HANDING_S, _SAVING_S = 1.0, 2.0
+# What the logger is given to save its files after another node has failed; on a busy machine that takes its time.
+_SAVING_S = 2.0
 # Between looks at nodes that say nothing; commands, reports and deaths are noticed at once.
 _LOOK_MS = 100
 
@@ -240,16 +239,10 @@ class Supervisor:
             self._server.serve()
 
     def _save(self, reason: str) -> None:
-        """Has the others hand their last blocks to the logger, ends them, and lets the logger write what it has."""
-        logger = self._server.roster.own("logger")
-        others = [child for role, child in self._children.items() if role != "logger"]
-        if logger and not self._children["logger"].wait(0.0):
-            self._server.abort(reason, but=logger)
-            given_up = self._machine.now() + _HANDING_S
-            for child in others:
-                child.wait(max(0.0, given_up - self._machine.now()))
-        for child in others:
-            child.kill()
+        """Lets the logger write what it has, and ends the others, which have nothing to lose."""
+        for role, child in self._children.items():
+            if role != "logger":
+                child.kill()
         self._server.abort(reason)
-        if logger:
+        if self._server.roster.own("logger"):
             self._children["logger"].wait(_SAVING_S)
