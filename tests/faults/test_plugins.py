@@ -86,7 +86,7 @@ def test_a_force_that_is_no_finite_number_fails_a_run_in_one_process_too(launche
 @pytest.mark.parametrize(
     ("statement", "reason"),
     first_and_slowly(
-        ("return 'much'", "TypeError: it returned 'much', which is text"),
+        ("return 'much'", "TypeError: it returned 'much', and a force must be a number"),
         ("1 / 0", "ZeroDivisionError: division by zero"),
     ),
 )
