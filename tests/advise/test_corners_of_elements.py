@@ -1,4 +1,4 @@
-"""What suits a loop as described may bear nothing in a corner: every parameter worth having is tried there."""
+"""Elements in every corner: the size that suits a loop as described may bear nothing there, a smaller one much."""
 
 from types import SimpleNamespace
 from typing import Any

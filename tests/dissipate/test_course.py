@@ -1,4 +1,4 @@
-"""What becomes of the width of a buzz: told to grow or to die down only where it does so all the way; its widest."""
+"""The width of a buzz: told to grow or to die down only where it does so all the way; its widest."""
 
 from __future__ import annotations
 

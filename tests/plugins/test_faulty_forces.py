@@ -1,4 +1,4 @@
-"""What becomes of an element that gives, in mid-run, what is no finite number, or no number at all."""
+"""Elements that give, in mid-run, what is no finite number, or no number at all."""
 
 import math
 from typing import Any
@@ -15,7 +15,7 @@ from haploop.launch.scene.layers import Layers
 from haploop.launch.spec import RunFailed
 from haploop.logger import read
 from haploop.protocol.ticks import Timebase
-from helpers.scenes.least import LEAST
+from helpers.scenes.least import HELD, LEAST
 
 DAMPING = {"kind": "damping", "damping": 0.3}
 KINDS = registry()
@@ -42,9 +42,7 @@ def scene(dissipation: list[dict[str, Any]], *events: dict[str, Any], **run: str
     """A press on a wall for 1.5 s."""
     tables = {
         "duration": 1.5,
-        "device": {"mass": 0.05, "damping": 0.1, "position": 0.001},
-        "wall": {"position": 0.0, "stiffness": 500.0},
-        "hand": {"force": {"kind": "constant", "value": -0.5}},
+        **HELD,
         "dissipation": dissipation,
         "event": list(events),
         "run": {"verdict": "window", **run},

@@ -26,7 +26,7 @@ from haploop.protocol.changes import at_work, changes_of
 from haploop.protocol.ticks import Timebase
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.run_figure import make_figure
-from helpers.scenes.least import LEAST
+from helpers.scenes.least import HELD, LEAST
 
 FIG6C = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
 DAMPING = {"kind": "damping", "damping": 0.3}
@@ -87,9 +87,7 @@ def own(dissipation: list[dict[str, Any]], events: tuple[dict[str, Any], ...] = 
     """A press on a wall for 0.4 s, or longer."""
     pressed = {
         "duration": 0.4,
-        "device": {"mass": 0.05, "damping": 0.1, "position": 0.001},
-        "wall": {"position": 0.0, "stiffness": 500.0},
-        "hand": {"force": {"kind": "constant", "value": -0.5}},
+        **HELD,
         "dissipation": dissipation,
         "event": list(events),
     }

@@ -22,6 +22,12 @@ PRESSED: dict[str, Any] = {
     "wall": {**WALL, "position": -1e-3},
     "clock": {"round_trip_delay": 0.0013},
 }
+# A device in the hand that is pressed onto a wall at 0, without a delay.
+HELD: dict[str, Any] = {
+    "device": {"mass": 0.05, "damping": 0.1, "position": 0.001},
+    "wall": {"position": 0.0, "stiffness": 500.0},
+    "hand": {"force": {"kind": "constant", "value": -0.5}},
+}
 
 
 def scene(**tables: Any) -> Scene:

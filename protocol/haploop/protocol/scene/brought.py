@@ -1,4 +1,4 @@
-"""What a scene names of the classes that plugin files have brought into this process."""
+"""Names in a scene of classes that plugin files have brought into this process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How wide a swing is along its windows, and whether it grew, died down, varied or stayed."""
+"""Widths of a swing along its windows, and the word for their course: grew, died down, varied or stayed."""
 
 from __future__ import annotations
 

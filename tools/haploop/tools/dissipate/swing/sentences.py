@@ -133,8 +133,11 @@ def buzzing(outcome: Outcome) -> list[tuple[float, float, str]]:
     """Returns each stretch in which the recording buzzes: from when to when, s, and its frequencies in words."""
     if several := outcome.several:
         return [(several.from_s, several.to_s, " and ".join(f"{at_Hz:.1f} Hz" for at_Hz, _ in several.lines))]
-    buzz = outcome.buzz
-    return [(span.from_s, span.to_s, _frequency(span, buzz)) for span in buzz.spans] if buzz else []
+    if not (buzz := outcome.buzz):
+        return []
+    if len(buzz.spans) == 1 and not _moves(buzz.least_Hz, buzz.most_Hz, buzz):
+        return [(*buzz.stretches[0], f"{buzz.frequency_Hz:.1f} Hz")]
+    return [(span.from_s, span.to_s, _frequency(span, buzz)) for span in buzz.spans]
 
 
 def _told(buzz: Buzz) -> dict[str, str]:
