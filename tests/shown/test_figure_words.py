@@ -88,9 +88,9 @@ def test_the_header_tells_verdict_and_numbers(runs: dict[str, Path]) -> None:
     assert any(words.startswith("displayed stiffness") for words in key_numbers(data))
     swing = {"rate_1_s": 0.0, "width_m": 5.2e-3, "spread_m": 1e-4, "frequency_Hz": 7.5, "felt": True, "chaotic": False}
     data.summary["stability"] = swing
-    assert "pushed, it swings 5.20 mm +- 100 µm peak to peak, at 7.50 Hz, felt" in key_numbers(data)
+    assert "held still and pushed, it swings 5.20 mm +- 100 µm peak to peak, at 7.50 Hz, felt" in key_numbers(data)
     data.summary["stability"] = swing | {"width_m": 0.0}
-    assert "pushed, it swings less than 1 nm peak to peak, felt" in key_numbers(data)
+    assert "held still and pushed, it swings less than 1 nm peak to peak, felt" in key_numbers(data)
 
 
 def test_the_header_tells_the_window_as_the_end_only_where_it_is(runs: dict[str, Path]) -> None:

@@ -280,6 +280,6 @@ def test_the_report_of_a_run_says_what_it_does_when_it_is_pushed(
     rests = shown(
         summary_table({**swap, "stability": {**found, "width_m": 2e-18, "felt": False, "chaotic": None}}), 200
     )
-    assert row(rests, "pushed, it swings") == ["less than 1 nm peak to peak, not felt"]
+    assert row(rests, "held still and pushed, it swings") == ["less than 1 nm peak to peak, not felt"]
     without = {name: value for name, value in swap.items() if name != "stability"}
-    assert "pushed, it swings" not in shown(summary_table(without), 200)
+    assert "held still and pushed, it swings" not in shown(summary_table(without), 200)

@@ -17,6 +17,7 @@ from haploop.launch.stability.looks import LOOKS_S
 from haploop.launch.stability.swing import Swing
 from haploop.protocol.scene.effects import Friction
 from helpers.runs.judged import ended, found
+from helpers.scenes import wild_loops
 from helpers.scenes.least import scene
 from helpers.scenes.pressed import pressed
 from helpers.scenes.unseen_loops import drawn
@@ -176,3 +177,27 @@ def test_a_wall_that_rests_at_the_lightest_hold_of_a_hand_is_steady_only_if_it_r
     finding = judge(ended(of), LOOKS_S)
     assert (finding.word, finding.at_hardest) == (word, there)
     assert finding.hardest_N == pytest.approx(1.7, rel=0.01)
+
+
+@pytest.mark.parametrize(("seen_um", "is_other"), [
+    (79, False), (90, False), (67, False), (108, True), (163, True), (58, True), (20, True), (0, False)])  # fmt: skip
+def test_a_swing_after_the_push_that_is_not_as_wide_as_its_runs_is_told_as_another(seen_um: float, is_other: bool):
+    """Widths of 79 +- 2 um: a fifth beyond two spreads is told; not where a hand or noise was in the run."""
+    swing = Finding("limit-cycle", "lasts", width_m=79e-6, spread_m=2e-6, frequency_Hz=40.0, felt=True)
+
+    def said(of: Finding, beside: tuple[str, ...] = ()) -> list[str]:
+        return of.entries(seen_um * 1e-6, beside)["stability"]["provisos"]
+
+    assert said(swing) == ["of another width than in its run"] * is_other
+    assert said(swing, ("noise",)) == said(replace(swing, chaotic=True)) == []
+    assert said(replace(swing, frequency_Hz=1.0)) == []  # its run's last half second holds no period of it
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [40174, 40224])
+def test_a_run_that_ends_on_the_way_to_its_swing_is_told_to_have_another_and_one_that_goes_on_is_not(seed: int):
+    short = wild_loops.drawn(seed)
+    assert short
+    for scene_of, said in ((short, ["of another width than in its run"]), (replace(short, duration=2.0), [])):
+        summary = run_in_process(scene_of, registry())
+        assert (summary["verdict"], summary["stability"]["provisos"]) == ("limit-cycle", said)

@@ -16,8 +16,8 @@ from haploop.protocol.changes import Event, is_change, refusals_as_status
 from haploop.protocol.plugin_file import raised_in_file
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import BlockLength, Timebase
-from haploop.protocol.transport.clock_client import REPORT_MS, ClockClient
-from haploop.protocol.transport.loop import IDLE_MS, ControllerEnd, check_samples
+from haploop.protocol.transport.clock_client import REPORT_MS, Aborted, ClockClient
+from haploop.protocol.transport.loop import IDLE_MS, ControllerEnd, LoopError, check_samples
 from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.node import NodeError, run_node
@@ -73,7 +73,18 @@ class ControllerNode:
         self._client.ready(0)
 
     def run(self) -> tuple[int, Message]:
-        """Answers until the plant ends the run; returns the number of ticks answered."""
+        """Answers until the plant ends the run; returns the number of ticks answered.
+
+        What has been answered is told also where the run fails, here or elsewhere.
+        """
+        try:
+            return self._run()
+        except Exception as error:
+            if isinstance(error, Aborted | ElementError | LoopError) or raised_in_file(error):
+                self._flush()
+            raise
+
+    def _run(self) -> tuple[int, Message]:
         controller, client, loop = self._controller, self._client, self._loop
         checked_values, tick = self._checked_values, controller.tick
         while (samples := loop.samples(tick)) is not None:
@@ -84,12 +95,7 @@ class ControllerNode:
                 client.wait(tick)
             if client.events:
                 self._schedule(client.take_events())
-            try:
-                loop.answer(tick, controller.answer(samples))
-            except Exception as error:
-                if isinstance(error, ElementError) or raised_in_file(error):
-                    self._flush()
-                raise
+            loop.answer(tick, controller.answer(samples))
             client.keep_in_touch(end, "plant")
             tick, held = end, end - self._reported
             if held >= self._block.ticks or (end >= client.until and self._block.is_worth_it(held)):

@@ -35,6 +35,8 @@ _LISTENS = ("plant", "controller")
 _STATUS_S = 0.1
 # So long another logger waits for the states from which it goes on, s.
 _STATE_S = 15.0
+# So long a last block that was sent may be on its way.
+_LAST_MS = 100
 _NO_STATE = (
     "No STATE of the {} came within {:g} s: it answers no second subscription, which ZeroMQ hands to it only with "
     "ZMQ_XPUB_VERBOSE."
@@ -174,8 +176,10 @@ class LoggerNode:
         if refused:
             self._client.progress(self._reached, self._status | (refusals_as_status(refused) or {}))
 
-    def _drain(self) -> None:
-        for role, frame in self._streams.drain():
+    def _drain(self, wait_ms: int = 0) -> bool:
+        """Takes what has come, or comes within a time; tells whether that was anything."""
+        came = self._streams.receive(wait_ms) if wait_ms else self._streams.drain()
+        for role, frame in came:
             self._check(role, frame)
             try:
                 self._take(role, frame)
@@ -184,6 +188,7 @@ class LoggerNode:
                     raise
                 what = f"{frame.name} of the {role} from tick {frame.fields[0]}"
                 raise NodeError(f"{what} cannot be booked: {type(error).__name__}: {error}.") from error
+        return bool(came)
 
     def _check(self, role: str, frame: Frame) -> None:
         """Looks through what a program of somebody else's has sent.
@@ -230,11 +235,12 @@ class LoggerNode:
             self._publisher.publish("ENERGY_BLOCK", first, self._tick - first, columns, self._status)
 
     def save(self, failed: str) -> Summary | None:
-        """Finishes because of what ``failed`` says, with the blocks that have come; None if nothing has begun."""
+        """Finishes because of what ``failed`` says, with the blocks that were sent; None if nothing has begun."""
         if not self._started:
             return None
         with contextlib.suppress(TelemetryGap, NodeError):
-            self._drain()
+            while self._drain(_LAST_MS):
+                pass
         return self.finish(failed)[1]
 
     def finish(self, failed: str) -> tuple[int, Summary]:

@@ -10,8 +10,8 @@ from haploop.plant.plant import Plant
 from haploop.protocol.plugin_file import bring_file
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import HELD_S, BlockLength, Timebase
-from haploop.protocol.transport.clock_client import ClockClient
-from haploop.protocol.transport.loop import PlantEnd
+from haploop.protocol.transport.clock_client import Aborted, ClockClient
+from haploop.protocol.transport.loop import LoopError, PlantEnd
 from haploop.protocol.transport.machine import machine_of
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.node import NodeError, run_node
@@ -57,6 +57,14 @@ class PlantNode:
         self._client.ready(0)
 
     def run(self) -> tuple[int, Message]:
+        """Steps until the run ends; what has been stepped is told also where it fails, here or elsewhere."""
+        try:
+            return self._run()
+        except (Aborted, ArithmeticError, LoopError):
+            self._flush()
+            raise
+
+    def _run(self) -> tuple[int, Message]:
         client, plant = self._client, self._plant
         while plant.stop_reason is None and not (client.last and plant.tick >= client.until):
             for tick, event in client.take_events():

@@ -269,8 +269,8 @@ class ClockServer:
         self._send(node.identity, "ABORT", reason)
         self.roster.nodes.pop(node.identity, None)
 
-    def abort(self, reason: str) -> None:
-        """Tells every node to save what it has and leave."""
+    def abort(self, reason: str, but: Node | None = None) -> None:
+        """Tells every node, but one perhaps, to save what it has and leave."""
         for node in list(self.roster.nodes.values()):
-            if not node.done:
+            if not node.done and node is not but:
                 self._send(node.identity, "ABORT", reason)

@@ -40,8 +40,9 @@ if TYPE_CHECKING:
 # run, and programs that take the place of its own.
 Start = Callable[[Path, Callable[[str], Message], bool, int, Mapping[str, Program]], dict[str, Child]]
 
-# What the logger is given to save its files after another node has failed; on a busy machine that takes its time.
-_SAVING_S = 2.0
+# What those that were heard of within this time are given to hand over their last blocks after a node has failed, and
+# the logger to save its files then; on a busy machine that takes its time.
+_SILENT_S, _HANDING_S, _SAVING_S = 0.5, 1.0, 2.0
 # Between looks at nodes that say nothing; commands, reports and deaths are noticed at once.
 _LOOK_MS = 100
 
@@ -239,10 +240,20 @@ class Supervisor:
             self._server.serve()
 
     def _save(self, reason: str) -> None:
-        """Lets the logger write what it has, and ends the others, which have nothing to lose."""
-        for role, child in self._children.items():
-            if role != "logger":
-                child.kill()
+        """Has those that answer hand their last blocks to the logger, ends them, and lets it write what it has."""
+        roster, loop = self._server.roster, [child for role, child in self._children.items() if role != "logger"]
+        lost = {node.role for node in roster.silent(self._machine.now(), _SILENT_S)}
+        lost |= {child.role for child in loop if child.wait(0.0)}
+        if (logger := roster.own("logger")) and not self._children["logger"].wait(0.0):
+            for child in loop:
+                if child.role in lost:
+                    child.kill()
+            self._server.abort(reason, but=logger)
+            given_up = self._machine.now() + _HANDING_S
+            for child in loop:
+                child.wait(max(0.0, given_up - self._machine.now()))
+        for child in loop:
+            child.kill()
         self._server.abort(reason)
-        if self._server.roster.own("logger"):
+        if logger:
             self._children["logger"].wait(_SAVING_S)

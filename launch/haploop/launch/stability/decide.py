@@ -10,6 +10,7 @@ from typing import Any
 from haploop.launch.stability.swing import REST_M, SAME, Swing
 from haploop.launch.stability.traces import is_felt, smallest_felt_m
 from haploop.launch.stability.why import AFTER_BLOW, AT_HARDEST, DECAYING, FRICTIONLESS, WHY
+from haploop.logger.verdict.measures import WINDOW_S
 
 # A swing that dies is watched until it is this small, or for long.
 _SMALL_M = 20e-6
@@ -24,7 +25,7 @@ _COUNTED_PERIODS = 60.0
 _DIES_1_S = 0.01
 # After so long, swings of both sizes that grow alike grow for good, and what is known not to change lasts.
 _ALIKE_S = 4.0
-# A swing of the loop that is wider than that of its run by more than this has not been seen in it.
+# Swings of the loop and of its run whose widths differ by more than this are not the same.
 _WIDER = 1.2
 # A frequency is known from so many periods on.
 _SEEN_PERIODS = 6.0
@@ -37,7 +38,8 @@ _STILL_N = 1e-9
 # A command whose ripple is more than this share of the push, a tenth of the hold, or this, is told of beside the word;
 # so is noise that moves the device by as much as a hand feels from 25 Hz on, peak to peak.
 _RIPPLES, _RIPPLES_N, _SHAKEN_M = 0.33, 0.1, 10e-6
-HAND_MOVES, NOISE, UNFELT = "the hand's motion", "noise", "less than a hand feels"
+HAND_MOVES, NOISE = "the hand's motion", "noise"
+UNFELT, OTHER_WIDTH = "less than a hand feels", "of another width than in its run"
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
 _COUNTS = 10
 
@@ -142,9 +144,10 @@ class Finding:
         return {"verdict": self.word, "verdict_rule": self.sentence(), "stability": numbers}
 
     def _provisos(self, seen_m: float | None, beside: Sequence[str], ripple_N: float | None) -> list[str]:
-        """Returns what has to be said in the same breath as ``steady``, or as a swing that nobody feels."""
+        """Returns what has to be said in the same breath as ``steady``, or as a swing that lasts."""
+        if self.word == "limit-cycle":
+            return [UNFELT] * (not self.felt) + [OTHER_WIDTH] * (not beside and self._is_other(seen_m))
         holds = {
-            UNFELT: self.word == "limit-cycle" and not self.felt,
             "only friction holds it": self.frictionless == "swings on",
             "perhaps only friction holds it": self.frictionless == "undecided",
             "an element's memory still changes": self.memory_drifts,
@@ -152,8 +155,14 @@ class Finding:
             "noise shakes it": NOISE in beside and (seen_m or 0.0) > _SHAKEN_M,
             "its force ripples": (ripple_N or 0.0) > min(_RIPPLES * self.push_N, _RIPPLES_N),
         }
-        told = [proviso for proviso, holds_it in holds.items() if holds_it]
-        return told if self.word == "steady" else [proviso for proviso in told if proviso == UNFELT]
+        return [proviso for proviso, holds_it in holds.items() if holds_it and self.word == "steady"]
+
+    def _is_other(self, seen_m: float | None) -> bool:
+        """Tells whether the run's swing is wider or narrower than that after the push, beyond what both vary by."""
+        if not seen_m or self.chaotic or self.frequency_Hz * WINDOW_S < 1.0:
+            return False
+        most_m, least_m = self.width_m + 2.0 * self.spread_m, self.width_m - 2.0 * self.spread_m
+        return not least_m / _WIDER <= seen_m <= most_m * _WIDER
 
     def own_share(self, seen_m: float | None) -> float | None:
         """Returns which share of the swing seen in the run the loop keeps up by itself, with a still hand and no noise.

@@ -145,11 +145,13 @@ class RunData:
             raise FigureError(_no_log(directory))
         log = recorded_log(directory)
         controller, energy = log.get("/controller", {}), log.get("/energy", {})
-        if not len(controller.get("timestamp", ())) or not len(energy.get("timestamp", ())):
+        if not len(controller.get("timestamp", ())):
             raise FigureError(f"The log in {directory} holds no tick, so there is nothing to draw. {log.cut}")
         if (scene := recorded_scene(directory, log.attachments)) is None:
             raise FigureError(f"There is neither a scene in the log in {directory} nor a scene.toml beside it.")
         plant = log.get("/plant")
+        if plant and len(plant["t"]) < 2:  # of a plant that was killed before it told of a tick
+            plant = None
         motion = plant or {**controller, "t": controller["timestamp"], "force": controller["total"]}
         forces = {name: motion[name] for name in ("actuator", "friction") if name in motion}
         if plant and scene.actuator:

@@ -125,7 +125,7 @@ def _head(header: Figure | SubFigure, run: RunData, label: str, y: float, colour
 
 
 def _numbers(run: RunData) -> str:
-    if not run.summary:
+    if not run.summary or not run.summary["ticks"]:
         return key_numbers(run)[0]
     found = run.summary.get("stability", {})
     measured = f"position{run.as_measured}" if run.as_measured else ""

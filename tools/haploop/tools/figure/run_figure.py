@@ -111,10 +111,12 @@ def failure(run: RunData) -> str:
 
 
 def key_numbers(run: RunData) -> list[str]:
-    """Returns oscillation, stiffness, contact and residual; of a run without a summary, how far its log goes."""
+    """Returns oscillation, stiffness, contact and residual; where nothing was booked, how far the log goes."""
     first, last = run.span_s
     if not run.summary:
         return [f"{'log cut off' if run.cut else 'no summary'}: {last - first:g} s of {run.scene.duration:g} s"]
+    if not run.summary["ticks"]:
+        return [f"nothing came of the plant: {last - first:g} s as the controller measured and commanded it"]
     window, energy = run.summary["window"], run.summary["energy"]
     # Of a run that failed the log may hold more than the window saw.
     from_s, to_s = window["from_s"], run.summary["duration_s"]
@@ -126,7 +128,7 @@ def key_numbers(run: RunData) -> list[str]:
     found = run.summary.get("stability", {})
     words[:0] = [", ".join(found["provisos"])] if found.get("provisos") else []
     if found.get("rate_1_s") is not None:
-        words.append(f"pushed, it swings {swing_words(found)}")
+        words.append(f"held still and pushed, it swings {swing_words(found)}")
     wall = run.wall_table_at(float(run.ticks_s[-1]))
     if wall and run.summary["verdict"] != "no-contact":
         words.append(f"outside the wall {100 * window['outside_fraction']:.0f} %")
@@ -168,7 +170,7 @@ class Row(NamedTuple):
 def book_rows(run: RunData, books: list[Book]) -> list[Row]:
     """Returns wall, its leak by cause, elements, then the books of the plant and the counts."""
     spans = {span.name: span for span in run.history.elements}
-    energy = run.summary.get("energy", {})
+    energy = run.summary.get("energy", {}) if run.energy else {}
     rows = []
     together = books[-1:] if len(books) > 1 else []
     shown = books[: len(books) - len(together)]

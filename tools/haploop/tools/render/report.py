@@ -211,7 +211,7 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     """Returns what a loop does, held still and pushed at its end; nothing where it was not watched to an answer."""
     if found.get("rate_1_s") is None:
         return []
-    rows = [("pushed, it swings", swing_words(found))]
+    rows = [("held still and pushed, it swings", swing_words(found))]
     if not rests(found):
         watched = f"watched for {found['watched_s']:g} s"
         rows += [
