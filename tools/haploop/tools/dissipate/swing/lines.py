@@ -12,7 +12,7 @@ from haploop.tools.dissipate.swing.buzz import FAST, Band
 from haploop.view.look.spectrum import Line, amplitudes, line_at, lobe, main_line
 
 # Of several swings, of which these are the most, each has so much of the variance, and peaks are so many lines apart.
-_MOST, _OF_EACH, _APART = 3, 0.1, 3
+_MOST, _OF_EACH, _APART = 3, 0.1, 2
 # The staircase of an encoder swings by less than a count, here the step that nine of ten exceed.
 COUNTS, _SMALLEST = 2, 10.0
 # Of a swing within the counts their rounding leaves so much of the variance; the staircase of a steady motion has 0.61
