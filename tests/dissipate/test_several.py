@@ -69,7 +69,7 @@ def test_two_buzzes_are_told_whatever_their_frequencies_beside_a_hands_motion_no
 
 @pytest.mark.parametrize("seed", [*range(4), *slowly(range(4, 24))])
 def test_two_buzzes_of_one_width_that_beat_at_four_and_a_half_hertz_or_more_are_never_called_none(seed: int) -> None:
-    """They part by little more than a line of the spectrum is wide; at 3 to 4 Hz some are told by their r.m.s. alone."""
+    """They part by little more than a line of the spectrum is wide; at 3 to 4 Hz some have an r.m.s. alone."""
     draw = np.random.default_rng(seed)
     first_Hz, apart_Hz = draw.uniform(18.0, 200.0), draw.uniform(4.5, 7.0)
     turned = np.sin(2.0 * np.pi * (first_Hz + apart_Hz) * S + draw.uniform(0.0, 6.0))
