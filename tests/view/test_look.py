@@ -132,12 +132,33 @@ def test_growth_and_decay_have_words_of_their_own():
     assert seen(lambda t: np.where(t > 2.9, np.nan, -1e-3)).word == "not finite"
 
 
-def test_a_swing_that_is_over_is_no_longer_told():
-    found = seen(lambda t: -5e-3 + np.where(t < 2.45, 1e-3 * np.sin(2 * np.pi * 30 * t), 0.0))
-    assert (found.word, found.oscillation_m, found.frequency_Hz) == ("no swing seen", 0.0, None)
-    assert "In the last 0.5 s the position stayed within 0 µm" in found.why
-    moves_yet = seen(lambda t: -5e-3 + np.where(t < 2.55, 1e-3 * np.sin(2 * np.pi * 30 * t), 0.0))
-    assert moves_yet.word == "dying away"
+def test_a_swing_that_is_over_is_told_to_have_died_until_two_seconds_show_none_of_it():
+    def stops(at_s):
+        return seen(lambda t: -5e-3 + np.where(t < at_s, 1e-3 * np.sin(2 * np.pi * 30 * t), 0.0))
+
+    over, gone = stops(2.45), stops(0.99)
+    assert (over.word, over.oscillation_m, over.rests) == ("dying away", 0.0, True)
+    assert "by more than 10 µm; in the last 0.5 s it did not." in over.why
+    assert (gone.word, gone.oscillation_m, gone.frequency_Hz) == ("no swing seen", 0.0, None)
+    assert "In the last 2 s the position stayed within 0 µm" in gone.why
+    assert (stops(2.55).word, stops(2.55).rests) == ("dying away", False)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whatever_moved_in_the_last_two_seconds_is_never_unseen_and_what_flickers_by_a_count_is(seed):
+    """Pushes, bursts of a buzz and slow swings, drawn; all of them more than four counts wide."""
+    draw = np.random.default_rng(seed)
+    begins, lasts, size = draw.uniform(1.0, 2.9), draw.uniform(0.02, 0.5), draw.uniform(5.0, 200.0) * COUNT_M
+    f = np.exp(draw.uniform(np.log(0.5), np.log(200.0)))
+
+    def moves(t):
+        burst = np.sin(2 * np.pi * f * (t - begins)) if seed % 2 else np.minimum((t - begins) / lasts, 1.0)
+        return -5e-3 + size * np.where((t > begins) & ((t < begins + lasts) | (seed % 2 == 0)), burst, 0.0)
+
+    rows = moves(np.arange(1000, 3000) / 1e3)
+    assert seen(moves).word != "no swing seen" or np.ptp(rows) <= 4 * COUNT_M
+    flickers = draw.integers(0, 2, 30_000) * COUNT_M
+    assert seen(lambda t: -5e-3 + flickers[np.rint(t * 1e4).astype(int)]).word == "no swing seen"
 
 
 def recorded(tmp_path, **values):

@@ -1,4 +1,4 @@
-"""Sight of a loop: what its newest half second shows, in a word that is told only of a whole window in one regime."""
+"""Sight of a loop: what its newest half second and two seconds show, in a word told only of a window in one regime."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from haploop.logger.verdict.measures import CROSSINGS, ROUNDING, SMALLEST_SWING_
 from haploop.view.look.spectrum import main_line
 from haploop.view.store.history import History
 
-# A slow swing is looked for in so many windows; growth and decay are told beyond these ratios of the two halves.
+# A slow swing, and one that has just ended, is looked for in so many windows; growth and decay are told beyond these ratios of the two halves.
 _LONG = 4
 _DIES, _GROWS = 0.5, 2.0
 # At rest, position stays within so many times what counts as a swing, and force within this share of the largest.
@@ -24,6 +24,8 @@ _WHY = {
     "the second half {growth:.2f} times as wide as the first.",
     "dying away": "In the last {seen:.3g} s the position swung through the middle of its motion {crossings} times, "
     "the second half {growth:.2f} times as wide as the first.",
+    "over": "In the last {seen:.3g} s the position swung through the middle of its motion {crossings} times "
+    "by more than {swing_um:.3g} µm; in the last {window:g} s it did not.",
     "moving": "In the last {seen:.3g} s the position moved by {width_um:.3g} µm and swung through the middle "
     "of its motion {crossings} times: a push of the hand, or a swing slower than can be told.",
     "force ripples": "The position rests, but in the last {window:g} s the force rippled by {ripple_N:.3g} N.",
@@ -44,6 +46,7 @@ class Sight:
         so_far: whether the interval is shorter than a window, so that no word is told yet.
         oscillation_m, ripple_N: widths of position and of applied force about their straight trends, peak to peak.
         force_swing_N: the applied force as it is, peak to peak.
+        rests: whether the position swung by no more than what counts in the newest window.
         frequency_Hz: of the line of the position where one stands out, else of that of the force; None for none.
         stiffness_N_m: mean of force over penetration at the ticks in contact; None of none.
     """
@@ -59,6 +62,7 @@ class Sight:
     stiffness_N_m: float | None = None
     force_swing_N: float | None = None
     so_far_word: str = ""
+    rests: bool = False
 
 
 def window_ticks(rate: int) -> int:
@@ -100,13 +104,16 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
         return Sight("not finite", _WHY["not finite"], first / rate, end / rate)
     swing_m = max(resolution_m, SMALLEST_SWING_M)
     (fast, fast_growth), (crossings, growth) = _swings(x, swing_m), _swings(slow, swing_m)
-    # Of a swing that is over the newest window knows nothing, though a longer look back still holds it.
-    if fast >= CROSSINGS or np.ptp(x) <= swing_m:
+    rests = bool(np.ptp(x) <= swing_m)
+    if fast >= CROSSINGS:
         crossings, growth, long_first, slow, slow_force = fast, fast_growth, first, x[::n], force[::n]
     seen_s = (end - long_first) / rate
     width, ripple = float(np.ptp(slow)), float(np.ptp(_flat(force)))
+    why = ""
     if not inside[-window:].any():
         word = "no contact"
+    elif crossings >= CROSSINGS and rests:
+        word, why = "dying away", "over"
     elif crossings >= CROSSINGS:
         word = "dying away" if growth < _DIES else "growing" if growth > _GROWS else "swinging"
     elif width > _REST * swing_m:
@@ -117,14 +124,14 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     so_far_word, word = word, "settling" if so_far else word
     line = main_line(slow, rate) if width > 2.0 * swing_m else None
     line = line or (main_line(slow_force, rate) if ripple else None)
-    why = _WHY[word].format(
+    why = _WHY[word if so_far else why or word].format(
         window=WINDOW_S, begin=by, seen=seen_s, crossings=crossings, growth=growth, swing_um=swing_m * 1e6,
         width_um=width * 1e6, ripple_N=ripple,
     )  # fmt: skip
     return Sight(
         word, why, first / rate, end / rate, so_far, float(np.ptp(_flat(x))), ripple,
         line.frequency_Hz if line else None, stiffness if inside[first - end :].any() else None,
-        float(np.ptp(force)), so_far_word,
+        float(np.ptp(force)), so_far_word, rests,
     )  # fmt: skip
 
 

@@ -61,8 +61,9 @@ function showVerdict(state) {
 /** What the picture shows still where a loop is judged steady, or not to be judged. */
 function moved({ verdict, sight }) {
   if (!["steady", "undecided"].includes(verdict) || !sight) return "";
-  const { oscillation_m: width, ripple_N: ripple } = sight;
+  const { oscillation_m: width, ripple_N: ripple, rests } = sight;
   const word = sight.so_far_word || sight.word;
+  if (rests && (word === "moving" || SWINGS.has(word))) return "";
   if (word === "force ripples") return `force still ripples by ${amount(ripple, "N")}`;
   if (word === "moving") return `still moves by ${amount(width, "m")}`;
   if (SWINGS.has(word)) return `still swings by ${amount(width, "m")}${word === "swinging" ? "" : `, ${word}`}`;

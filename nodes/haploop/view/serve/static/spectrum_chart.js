@@ -87,5 +87,5 @@ export class SpectrumChart {
 /** The main line in words. */
 function told(line, unit) {
   if (!line) return `no line stands out`;
-  return `${amount(line.frequency_Hz, "Hz")}, ${amount(line.width, unit)} peak to peak`;
+  return `main line ${amount(line.frequency_Hz, "Hz")}, ${amount(line.width, unit)} peak to peak of it alone`;
 }
