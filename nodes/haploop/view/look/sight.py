@@ -42,7 +42,7 @@ class Sight:
     Attributes:
         word: a key of the rules; ``why`` is a sentence.
         so_far_word: what the word would be if the interval were a whole window; "" where nothing can be told.
-        from_s, to_s: the interval that was looked at.
+        from_s, to_s: the interval that the word is about; numbers are of its newest window.
         so_far: whether the interval is shorter than a window, so that no word is told yet.
         oscillation_m, ripple_N: widths of position and of applied force about their straight trends, peak to peak.
         force_swing_N: the applied force as it is, peak to peak.
@@ -129,7 +129,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
         width_um=width * 1e6, ripple_N=ripple,
     )  # fmt: skip
     return Sight(
-        word, why, first / rate, end / rate, so_far, float(np.ptp(_flat(x))), ripple,
+        word, why, long_first / rate, end / rate, so_far, float(np.ptp(_flat(x))), ripple,
         line.frequency_Hz if line else None, stiffness if inside[first - end :].any() else None,
         float(np.ptp(force)), so_far_word, rests,
     )  # fmt: skip
