@@ -33,6 +33,8 @@ _PICTURE = re.compile(r"(?<!\[)(!\[[^\]]*\]\(([^)\s]+)\))")
 _LINK = re.compile(r"(!?)\[((?:[^\]\[]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 # A command or a name in a sentence that is short enough to stand in one line of a phone.
 _SHORT = re.compile(r"<code>([^<>]{1,28})</code>")
+# A role of Sphinx, which Markdown shows as it is written.
+_ROLE = re.compile(r":[a-z]+:<code[^>]*>[^<]*</code>")
 
 
 def on_files(files: Files, config: Any) -> Files:
@@ -44,8 +46,14 @@ def on_files(files: Files, config: Any) -> Files:
     return files
 
 
-def on_page_content(html: str, **_: Any) -> str:
-    """Returns the page with its short pieces of code marked as whole: a browser would break them after every hyphen."""
+def on_page_content(html: str, page: Any = None, **_: Any) -> str:
+    """Returns the page with its short pieces of code marked as whole: a browser would break them after every hyphen.
+
+    Raises ValueError where a docstring has a role of Sphinx, which would stand there as it is written.
+    """
+    if role := _ROLE.search(html):
+        where = page.file.src_uri if page else "a page"
+        raise ValueError(f"{where} shows {role[0]!r}; in the docstring write the name in two backticks on either side.")
     return _SHORT.sub(r'<code class="whole">\1</code>', html)
 
 

@@ -10,8 +10,8 @@ From Python::
     result["/plant"]["x"], result["/plant"].units["x"]     # an array, and its unit
     run(scene.swap("damping", at="1.5 s", damping=0.8), out="runs/swapped")
 
-See :func:`haploop.launch.runs.loaded_scene.load`, :class:`haploop.launch.runs.loaded_scene.LoadedScene` and
-:func:`haploop.launch.runs.result.run`, which are imported when first used.
+See ``haploop.launch.runs.loaded_scene.load``, ``haploop.launch.runs.loaded_scene.LoadedScene`` and
+``haploop.launch.runs.result.run``, which are imported when first used.
 """
 
 from __future__ import annotations

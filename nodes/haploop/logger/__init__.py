@@ -1,7 +1,7 @@
 """The energy books, the log and the process that keeps them.
 
 ``haploop.logger.read(directory)`` gives a run's log as NumPy arrays, ``haploop.logger.stream(directory)`` piece by
-piece, so that a log of any length fits into memory: see :func:`haploop.logger.log.stream.read` and ``LogStream``.
+piece, so that a log of any length fits into memory: see ``haploop.logger.log.stream.read`` and ``LogStream``.
 """
 
 from typing import TYPE_CHECKING

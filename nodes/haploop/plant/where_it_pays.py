@@ -19,7 +19,7 @@ class WhereItPays:
     Attributes:
         may_wait: whether this process may wait until they are compiled, 16 s, or a minute on a busy machine: not the
             nodes of a run, which have deadlines and load what is made already; runs in one process and batches set it.
-        is_off: whether all does without: set by :meth:`none` alone.
+        is_off: whether all does without: set by ``none`` alone.
         pays: from how much on it pays.
         asked: how much was to be done so far.
     """

@@ -232,7 +232,7 @@ def at_work(scene: Scene, changes: Iterable[Change]) -> Scene:
 
 
 def describe(event: Event, units: Mapping[str, str] = _NO_UNITS) -> str:
-    """Returns any event in a few words; ``units`` as in :meth:`Change.describe`."""
+    """Returns any event in a few words; ``units`` as in ``Change.describe``."""
     if is_change(event):
         return Change.from_dict(0, event).describe(units)
     match next((kind for kind in KINDS if kind in event), None):

@@ -76,7 +76,7 @@ class Timebase:
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Timebase:
-        """Makes the timebase of a scene; raises as :meth:`from_clock` does."""
+        """Makes the timebase of a scene; raises as ``from_clock`` does."""
         return cls.from_clock(scene.clock, scene.duration)
 
     def as_dict(self) -> dict[str, int]:

@@ -119,7 +119,7 @@ class Launched:
 
     Attributes:
         out: the directory named by ``--out``, or None.
-        took_s: wall time from the last :meth:`signal` or :meth:`kill` to the end, for people who read the output.
+        took_s: wall time from the last ``signal`` or ``kill`` to the end, for people who read the output.
     """
 
     def __init__(self, *arguments: str, out: Path | None = None, disk_bytes: int | None = None) -> None:
@@ -190,7 +190,7 @@ class Run(Launched):
     """``haploop run`` as a process, and its nodes.
 
     Attributes:
-        nodes: pid by role, once :meth:`nodes_started` or :meth:`reaches` has returned.
+        nodes: pid by role, once ``nodes_started`` or ``reaches`` has returned.
     """
 
     def __init__(

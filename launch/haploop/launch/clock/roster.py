@@ -163,7 +163,7 @@ class Roster:
     def table(self) -> list[Message]:
         """Returns role, pid, tick, lag behind the first, whom it waits for and skipped ticks of every node.
 
-        One that is no program of haploop's has its ``program`` beside, as in :meth:`provenance`.
+        One that is no program of haploop's has its ``program`` beside, as in ``provenance``.
         """
         programs = self.provenance()
         first = max((node.tick for node in self.nodes.values()), default=0)

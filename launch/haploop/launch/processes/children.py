@@ -143,7 +143,7 @@ class _Group:
         environment: of the program; the mark is put there.
 
     Attributes:
-        id: of the group, which no other can have before :meth:`kill`.
+        id: of the group, which no other can have before ``kill``.
     """
 
     def __init__(self, environment: dict[str, str]) -> None:

@@ -23,7 +23,7 @@ def ask_for_many() -> float:
 
 
 def allow_many() -> None:
-    """Does as :func:`ask_for_many`; raises OutputError where they may open too few."""
+    """Does as ``ask_for_many``; raises OutputError where they may open too few."""
     from haploop.launch.spec import OutputError
 
     may = ask_for_many()

@@ -121,7 +121,7 @@ class LoadedScene:
             parameters: of the new element, ``acts`` included.
 
         Raises:
-            SceneError, ElementError: as for :meth:`set`.
+            SceneError, ElementError: as for ``set``.
             PluginError: the class is no usable element.
         """
         scene, name = self, kind
@@ -152,7 +152,7 @@ def load(
 
     Args:
         path: the scene file (TOML).
-        values: laid over what it says, as in :meth:`LoadedScene.set`.
+        values: laid over what it says, as in ``LoadedScene.set``.
         elements: element classes that may be named by their kind, in this scene and in those made of it.
         plugins: files that define elements, walls, estimators or hand forces.
 

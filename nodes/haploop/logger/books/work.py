@@ -162,7 +162,7 @@ def add_columns(state: Sums, increments: np.ndarray) -> tuple[Sums, np.ndarray]:
 
 
 def add_ticks_of_batch(state: Sums, increments: np.ndarray) -> Sums:
-    """Adds tick after tick, shape (ticks, rows, batch), for every member to the same bits as :func:`add_columns`."""
+    """Adds tick after tick, shape (ticks, rows, batch), for every member to the same bits as ``add_columns``."""
     sums, errors = state.sums, state.errors.copy()
     for increment in increments:
         after = sums + increment

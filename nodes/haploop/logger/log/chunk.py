@@ -84,7 +84,7 @@ class TableRows:
 
 
 class FreeRows:
-    """Messages of any length, one by one; attributes and methods as of :class:`TableRows`."""
+    """Messages of any length, one by one; attributes and methods as of ``TableRows``."""
 
     def __init__(self, channel: int) -> None:
         self.channel = channel

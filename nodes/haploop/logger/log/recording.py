@@ -142,7 +142,7 @@ def merge_columns(known: Mapping[str, str], new: Mapping[str, str]) -> dict[str,
 
 
 class MemoryLog:
-    """Takes what :class:`haploop.logger.log.writer.Log` takes, and gives what reading its file would, bit for bit."""
+    """Takes what ``haploop.logger.log.writer.Log`` takes, and gives what reading its file would, bit for bit."""
 
     def __init__(self) -> None:
         self._channels: list[tuple[str, dict[str, str]]] = []

@@ -237,7 +237,7 @@ class LogStream:
 def read(path: str | Path, topics: Collection[str] | None = None, columns: Collection[str] | None = None) -> Recording:
     """Returns the log of a run: arrays by topic and column, ``read(run)["/plant"]["x"]``.
 
-    Arguments and errors are those of :class:`LogStream`. A topic that has columns, but none of those asked for, is left
+    Arguments and errors are those of ``LogStream``. A topic that has columns, but none of those asked for, is left
     out. Of a log that was cut off there is everything up to the last whole chunk, and ``truncated`` is set.
     """
     log = LogStream(path, topics, columns)

@@ -96,7 +96,7 @@ class TableLayout:
 
     @classmethod
     def from_json_schema(cls, schema: bytes) -> TableLayout:
-        """Returns the layout that :meth:`json_schema` described; one without columns for any other schema."""
+        """Returns the layout that ``json_schema`` described; one without columns for any other schema."""
         try:
             found = json.loads(schema or b"{}")
             samples = found["minItems"] if found.get("type") == "array" else None

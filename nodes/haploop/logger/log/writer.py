@@ -1,7 +1,7 @@
 """The log file of a run: MCAP, written a block of ticks at a time, readable up to its last chunk whatever happens.
 
 The frame of the file is made of the ``mcap`` library's own records. What is written a thousand times a second, the
-message records inside a chunk and their index, is composed by NumPy (:mod:`haploop.logger.log.chunk`), since the
+message records inside a chunk and their index, is composed by NumPy (``haploop.logger.log.chunk``), since the
 library's writer takes a Python call, and some microseconds, for every message.
 """
 
@@ -28,7 +28,7 @@ _CHUNK_BYTES = 1 << 20
 class Log:
     """One MCAP file; whatever writes to it raises LogError where the operating system refuses.
 
-    Messages gather in a chunk, which reaches the operating system when it passes 1 MB or at :meth:`flush`; from then
+    Messages gather in a chunk, which reaches the operating system when it passes 1 MB or at ``flush``; from then
     on the end of this process takes nothing of it away. Inside a chunk messages stand channel by channel; readers
     bring them into the order of log time. Log time and publish time are the simulated time in ns.
     """
@@ -48,11 +48,11 @@ class Log:
     ) -> int:
         """Registers a channel and returns its number; for what is registered already, the number it has.
 
-        The same topic may be registered again with other columns: :func:`haploop.logger.read` joins its channels.
+        The same topic may be registered again with other columns: ``haploop.logger.read`` joins its channels.
 
         Args:
             topic: such as ``/plant``.
-            columns: unit by column name ("" for a pure number); empty for free maps, see :meth:`message`.
+            columns: unit by column name ("" for a pure number); empty for free maps, see ``message``.
             samples_per_message: None for messages that are one map; else a message is an array of so many maps, 1 at
                 least (ValueError).
             title: what the channel holds, for people; also the name of its schema.
