@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from haploop.controller.dissipation import registry
@@ -14,8 +16,10 @@ from haploop.launch.runs.result import Result, unit_of
 from haploop.launch.scene.schema import json_schema
 from haploop.tools.render.terminal import markdown_table
 
+sys.path.insert(0, str(Path(__file__).parent))
+import meanings
+
 GENERATED = "*Generated from the code with this page's site.*"
-# The tables of a scene in the order of its description; each may be of several kinds.
 _API = """\
 # Python
 
@@ -167,15 +171,45 @@ def _example() -> Result:
 
 
 def summary() -> str:
-    """Returns the page of the summary's entries with units and an example, from a run."""
-    rows = [(f"`{key}`", unit_of(key) or "–", _plain(_shown(value))) for key, value in _leaves(_example().summary)]
+    """Returns the page of the summary's entries: what each means, its unit, and an example from a run."""
+    shown = {meanings.pattern(key): _shown(value) for key, value in reversed([*_leaves(_example().summary)])}
+    tables: dict[str, list[tuple[str, ...]]] = {"": []}
+    for key, meaning in meanings.summary().items():
+        table = key.partition(".")[0] if key.partition(".")[0] in _TABLES else ""
+        row = f"`{key}`", unit_of(key) or "–", meaning, _plain(shown.get(key) or "–")
+        tables.setdefault(table, []).append(row)
     about = (
-        "`summary.json`, `result.summary` and `haploop run --json` hold these entries; the end of a key says its unit. "
-        "The values are those of a run of `all_effects`, 0.6 s long, with a swap. A number that the run did not "
-        "come to is `null`. Books are positive where energy was taken out of the device."
+        "`summary.json`, `result.summary` and `haploop run --json`, which adds `directory` and `notes`, hold these "
+        "entries; the end of a key says its unit. "
+        "N is a place in a list, NAME a name of the scene or the machine. The values are those of a run of "
+        "`all_effects`, 0.6 s long, with a swap; where there is none, that run has no such entry. A number that a run "
+        "did not come to is `null`. [The books](../books.md#how-they-add-up) says how the energies add up."
     )
-    table = markdown_table(("key", "unit", "for example"), rows)
-    return "\n\n".join(["# Summary", GENERATED, about, '<div class="keys entries" markdown>', table, "</div>"]) + "\n"
+    parts = ["# Summary", GENERATED, about]
+    for table, rows in tables.items():
+        parts += [f"## `{table}`", _TABLES[table]] if table else ["## The run"]
+        parts.append(_entries(("key", "unit", "meaning", "for example"), rows))
+    return "\n\n".join(parts) + "\n"
+
+
+_LONGEST = 24  # letters of an example
+# The parts of a summary that have a heading of their own, with what is to be said of all of it.
+_TABLES = {
+    "stability": "What was found when the loop was held still at the end of the run and pushed. Absent where that was "
+    "not done.",
+    "window": "The last half second of the run, or the second half of a shorter one, hand and noise in it.",
+    "extremes": "The whole run.",
+    "energy": "The energy books at the end of the run. A key that ends in `sampled_J` is of what the controller knows, "
+    "one that ends in `true_J` of what happened.",
+    "lateness": "How late the ticks were, of a run at a pace or one whose plant owns the time. Absent of any other.",
+    "programs": "What plant and controller are, NAME, where one of them is a program of somebody else's. Absent of any "
+    "other run.",
+}
+
+
+def _entries(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Returns a table that a phone shows row by row, each with what it means below its name."""
+    return f'<div class="stacked entries" markdown>\n\n{markdown_table(heads, rows)}\n\n</div>'
 
 
 def _leaves(entry: Any, key: str = "") -> Iterator[tuple[str, Any]]:
@@ -188,22 +222,19 @@ def _leaves(entry: Any, key: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _shown(value: Any) -> str:
-    """Returns a value as the JSON file has it, a float shortened, text without its quotes."""
-    return f"{value:.4g}" if isinstance(value, float) else value if isinstance(value, str) else json.dumps(value)
+    """Returns a value as the JSON file has it, a float shortened, text without its quotes and cut where it is long."""
+    if isinstance(value, str):
+        return value if len(value) <= _LONGEST else f"{value[:_LONGEST]}…"
+    return f"{value:.4g}" if isinstance(value, float) else json.dumps(value)
 
 
 def log() -> str:
-    """Returns the page of the log's channels, columns and units, from a run."""
+    """Returns the page of the log's channels: the unit of every column, and what it means."""
     parts = ["# Log", GENERATED, _LOG]
-    for topic, rows in _example().log.items():
-        parts.append(f"## `{topic}`")
-        if isinstance(rows, list):
-            parts.append("Maps, not columns: `timestamp` (s), `tick`, and the event as it was given.")
-            continue
-        parts.append(
-            markdown_table(("column", "unit"), [(f"`{name}`", unit or "–") for name, unit in rows.units.items()])
-        )
-    return "\n\n".join(parts) + "\n"
+    for topic, columns in meanings.columns().items():
+        rows = [(f"`{name}`", one.unit or "–", one.meaning) for name, one in columns.items()]
+        parts += [f"## `{topic}`", _ABOUT[topic], _entries(("column", "unit", "meaning"), rows)]
+    return "\n\n".join([*parts, "## `/events`", _EVENTS]) + "\n"
 
 
 _LOG = (
@@ -212,8 +243,17 @@ _LOG = (
     "what changed. "
     "`haploop.api.read(directory)` gives NumPy arrays by channel and column, `.frame()` a pandas frame (with the "
     "extra `pandas`); "
-    '`run.log = "ticks"` leaves out `/plant`, `"none"` all of it. The columns are those of a run of `all_effects`.'
+    '`run.log = "ticks"` leaves out `/plant`, `"none"` all of it. Positions, velocities and forces count '
+    "along the one axis of the scene. A run has the columns of what its scene holds."
 )
+_ABOUT = {
+    "/plant": "What is true of the motion, which nobody in the loop knows. The last row is the end of the run.",
+    "/controller": "What the controller knew and did. N is the place of an element in the list, from 0.",
+    "/energy": "Running sums: true books and those of the plant up to the tick, sampled ones with the tick's sample. "
+    "ELEMENT is the kind of an element, with a number from the second of a kind on; FORCE the table of a force that an "
+    "installed package brings. [The books](../books.md#how-they-add-up) says how they add up.",
+}
+_EVENTS = "Maps, not columns: `timestamp` (s), `tick`, and the event as it was given."
 
 
 def api() -> str:

@@ -6,11 +6,16 @@ from typing import Any
 
 import numpy as np
 
-# What is counted: the columns of the plant's telemetry, each named by its place in the summary.
+# What is counted: the columns of the plant's telemetry, each named by its place in the summary, and what it means.
 DROPPED, LOST = "lost.commands_dropped", "lost.commands_lost"
 SATURATED = "actuator.saturated_commands"
 CLIPPED = "accelerometer.clipped_ticks"
-COUNTERS = (DROPPED, LOST, SATURATED, CLIPPED)
+COUNTERS = {
+    DROPPED: "commands that never acted, since a later one overtook them (jitter, or a delay made shorter)",
+    LOST: "commands that the line lost, of those that would have acted within the run",
+    SATURATED: "commands whose force the saturation of the actuator cut off; of a scene with one alone",
+    CLIPPED: "ticks at which the accelerometer's range cut its reading off; of a scene with one alone",
+}
 
 
 class Counter:

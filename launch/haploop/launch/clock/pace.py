@@ -16,6 +16,19 @@ CATCH_UP_S = 0.02
 _LATE_S = 0.001
 # Lateness is counted in classes, each wider than the one before by this factor.
 _FINEST_S, _FACTOR = 1e-6, 1.05
+# The entries of ``lateness`` of a run at a pace, or of one whose plant owns the time; absent where there was neither.
+LATENESS = {
+    "ticks": "ticks whose lateness is known: at a pace, how long after it was due a tick was done; where the plant "
+    "owns the time, how long after its sample was due an answer came",
+    "median_s": "half of the ticks were no later than this; at a pace to 5 %",
+    "percent_99_s": "99 % of the ticks were no later than this; at a pace to 5 %",
+    "percent_99_9_s": "99.9 % of the ticks were no later than this; where the plant owns the time alone",
+    "most_s": "lateness of the latest tick",
+    "late_ticks": "ticks that were later than `late_s`",
+    "late_s": "from when on a tick counts as late; at a pace 1 ms, or a period where that is longer",
+    "lost_s": "real time by which the schedule was put off, since a stall is not made up for",
+    "clock": "`plant` where the plant owned the time; absent otherwise",
+}
 
 
 class PaceError(ValueError):
@@ -110,11 +123,7 @@ class Pace:
                 self._awaited.appendleft((tick, end, due + (tick - first) * self._period_s))
 
     def lateness(self) -> dict[str, Any]:
-        """Returns how late the ticks were done; {} where none was to keep a pace.
-
-        ``ticks`` of them, ``median_s``, ``percent_99_s`` (to 5 %) and ``most_s``, ``late_ticks`` how many were late by
-        more than ``late_s``, a period or 1 ms if that is longer, and ``lost_s`` the real time lost.
-        """
+        """Returns how late the ticks were done, by keys of ``LATENESS``; {} where none was to keep a pace."""
         ticks = self._late.total()
         if not ticks:
             return {}

@@ -46,6 +46,13 @@ _COUNTS = 10
 # A width below this is told in micrometres; what changes by less than this has come to its end.
 _FINE_UM, _STILL_1_S = 10.0, 0.05
 
+# What ``Finding.entries`` tells of the run beside the finding.
+BESIDE = {
+    "own_share": "which share of the oscillation in the run's last window the loop keeps up by itself; the rest is the "
+    "hand's own motion or noise, or dies away; null where that cannot be told",
+    "moved_beside": "what else moved the run at its end: the hand's motion, noise",
+    "provisos": "what the verdict rests on, to be said in the same breath",
+}
 _DOES = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on", "diverged": "swings on"}
 
 
@@ -55,13 +62,15 @@ class Finding:
 
     Attributes:
         word: steady, limit-cycle, growing, diverged, no-contact or undecided.
-        why: key of ``why.WHY``.
-        push_N: the larger of the two pushes.
+        why: what was found, in short, such as ``rest`` or ``forgets``: a key of ``why.WHY``.
+        push_N: the larger of the two pushes, in magnitude.
         watched_s: time looked at, since the push.
-        rate_1_s, error_1_s: growth of the swing and its standard error; None where it died within a few pieces.
-        frequency_Hz: of what remains at the end.
-        width_m: what remains, peak to peak: the mean over the last quarter of both traces.
-        spread_m: half the range of that width over the pieces and traces.
+        rate_1_s: the r of e^(r t) by which the steadier of the two swings grows; negative: it decays; None where it
+            died within a few pieces.
+        error_1_s: standard error of ``rate_1_s``.
+        frequency_Hz: frequency of the swing that remains at the end; 0 where none does.
+        width_m: width of the swing that remains, peak to peak: the mean over the last quarter of both traces.
+        spread_m: half the range of ``width_m`` over the pieces and traces.
         force_ripple_N: what the command swings by above 30 Hz, peak to peak, in the last quarter.
         felt: whether a hand feels the swing.
         chaotic: whether two copies started a thousandth apart ended apart by a fifth of the swing; None if not asked.
@@ -70,14 +79,14 @@ class Finding:
         most_1_s: what either swing may grow or decay by: its rate and two standard errors, of the one that may change
             most; None where it was not watched to an answer.
         blow_N: of a loop that rests after the push, a harder one, into the wall and off it; None if not asked.
-        blown: what it does after these: rests, rests off the wall, swings on, or undecided.
+        blown: what it does after these: rests, rests off the wall, swings on, or undecided; None if not asked.
         frictionless: what a loop that rests, too, after these would do after the push without its friction: rests,
             swings on, or undecided; None if not asked, and of a loop without.
         hardest_N: of a loop that rests then, too, the hardest hold that its hand came to; None if that was about the
             last one, or the hand stays.
-        at_hardest: what it does there: rests, swings on, or undecided.
+        at_hardest: what it does there: rests, swings on, or undecided; None if not asked.
         settles_s: how long after the push it came within 5 % of where it rests; None of one that does not.
-        memory_drifts: whether what an element remembers still goes on changing where the loop rests; see ``drifts``.
+        memory_drifts: whether what an element remembers still goes on changing where the loop rests.
     """
 
     word: str
@@ -139,8 +148,8 @@ class Finding:
         numbers = {name: value for name, value in vars(self).items() if name not in ("word", "detail")}
         # A swing that nothing else moves is the loop's own, and differs from the one after a push by chance alone.
         is_told = beside or self.word == "steady"
-        numbers |= {"own_share": self.own_share(seen_m) if is_told else None, "moved_beside": [*beside]}
-        numbers["provisos"] = self._provisos(seen_m, beside, ripple_N)
+        told = self.own_share(seen_m) if is_told else None, [*beside], self._provisos(seen_m, beside, ripple_N)
+        numbers |= zip(BESIDE, told, strict=True)
         return {"verdict": self.word, "verdict_rule": self.sentence(), "stability": numbers}
 
     def _provisos(self, seen_m: float | None, beside: Sequence[str], ripple_N: float | None) -> list[str]:

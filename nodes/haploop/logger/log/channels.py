@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,51 @@ from haploop.protocol.changes import Event
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.telemetry import Block
 
-_MOTION = {f"{body}{name}": unit for body in ("", "tip_", "hand_") for name, unit in (("x", "m"), ("v", "m/s"))}
-UNITS = _MOTION | dict.fromkeys(("force", "actuator", "friction"), "N")
+
+class Column(NamedTuple):
+    """A column of the log: its unit, "" for a pure number, and what it means."""
+
+    unit: str
+    meaning: str
+
+
+TIME = Column("s", "simulated time of the tick, from the start of the run on")
+# Positions, velocities and forces count along one axis, that of the scene.
+PLANT: Mapping[str, Column] = {
+    "timestamp": Column("s", "simulated time of the plant step, from the start of the run on"),
+    "t": Column("s", "the same number"),
+    "x": Column("m", "true position of the device, of the motor where there is a cable"),
+    "v": Column("m/s", "true velocity of the same body"),
+    "tip_x": Column("m", "true position of the device's tip behind the cable"),
+    "tip_v": Column("m/s", "true velocity of the tip"),
+    "hand_x": Column("m", "true position of the hand's mass behind the grip"),
+    "hand_v": Column("m/s", "true velocity of the hand's mass"),
+    "force": Column(
+        "N", "force of the actuator from this step on: the command in effect, rounded and cut off as the actuator does"
+    ),
+    "actuator": Column("N", "force that the device feels at this step, where a bandwidth lets it lag behind `force`"),
+    "friction": Column(
+        "N", "dry friction on the device, or the motor, from this step on; against the motion, 0 while stuck"
+    ),
+}
+CONTROLLER: Mapping[str, Column] = {
+    "timestamp": TIME,
+    "x": Column("m", "measured position, with noise and whole counts: the sample that the tick answers"),
+    "v": Column("m/s", "velocity that the scene's estimator makes of the measured positions"),
+    "a": Column("m/s^2", "acceleration, estimated, or the accelerometer's reading"),
+    "wall": Column("N", "force of the wall that the controller computed at this tick; 0 out of contact"),
+    "total": Column("N", "the command: forces of the wall and of all elements; it acts later, by the delay"),
+    "in_contact": Column("", "1 where the measured position lies strictly inside the wall, else 0"),
+    "dissipation.N": Column("N", "force of element N in the list; 0 out of contact unless it acts always"),
+}
+# What an element shows beside its force is declared in its class, with its unit.
+OWN = Column("", "what element N shows of its memory, in the unit that its class declares")
 # Each link of telemetry leads on to the body that the log names.
 _FAR_END = {"cable": "tip", "grip": "hand"}
-CONTROLLER_UNITS = {"x": "m", "v": "m/s", "a": "m/s^2", "wall": "N", "total": "N", "in_contact": ""}
 
 
 class Sink(Protocol):
-    """Sink of channels: :class:`haploop.logger.log.writer.Log`, or what takes the same without a file."""
+    """Sink of channels: ``haploop.logger.log.writer.Log``, or what takes the same without a file."""
 
     def channel(
         self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str
@@ -55,7 +91,7 @@ class Channels:
             self._plant_messages(tick, 1, 1, state)
 
     def _plant_messages(self, first: int, ticks: int, samples: int, columns: dict[str, np.ndarray]) -> None:
-        units = {"timestamp": "s", "t": "s"} | {name: UNITS[name] for name in columns}
+        units = {name: PLANT[name].unit for name in ("timestamp", "t", *columns)}
         channel = self._log.channel(
             "/plant", units, samples_per_message=samples, title="the plant at every step; force acts from it on"
         )
@@ -70,7 +106,8 @@ class Channels:
         columns = {name: as_float64(data)[first - block["from_tick"] :] for name, data in block["columns"].items()}
         kinds = ", ".join(f"dissipation.{i} is {e['kind']}" for i, e in enumerate(block["elements"])) or "no element"
         own = [(i, each.get("columns", {})) for i, each in enumerate(block["elements"])]
-        known = CONTROLLER_UNITS | {f"dissipation.{i}.{name}": shown[name] for i, shown in own for name in shown}
+        shows = {f"dissipation.{i}.{name}": shown[name] for i, shown in own for name in shown}
+        known = {name: column.unit for name, column in CONTROLLER.items()} | shows
         units = {name: known.get(name, "N") for name in columns}
         self._ticks("/controller", f"the controller at every tick; {kinds}", units, first, columns)
 
@@ -79,7 +116,7 @@ class Channels:
         self._ticks("/energy", "the energy books at every tick", dict.fromkeys(columns, "J"), first, columns)
 
     def _ticks(self, topic: str, title: str, units: dict[str, str], first: int, columns: dict[str, np.ndarray]) -> None:
-        channel = self._log.channel(topic, {"timestamp": "s"} | units, title=title)
+        channel = self._log.channel(topic, {"timestamp": TIME.unit} | units, title=title)
         ticks = len(next(iter(columns.values())))
         if not ticks:
             return
@@ -93,7 +130,7 @@ class Channels:
 
 
 def motion_columns(plant: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Returns columns of ``UNITS`` from telemetry: positions and velocities of all bodies against ground, forces."""
+    """Returns columns of ``PLANT`` from telemetry: positions and velocities of all bodies against ground, forces."""
     x, v = plant["x"], plant["v"]
     columns = {"x": x, "v": v, "force": plant["force"]}
     for link, body in _FAR_END.items():

@@ -41,14 +41,15 @@ class Figures(NamedTuple):
     """The ``window`` entry of the summary.
 
     Attributes:
-        oscillation_m: peak to peak.
-        growth_1_s: the r of e^(r t) by which the swings grow (decay where negative); None where nothing swings.
+        from_s: when the window begins: half a second before the end, half of a run that is shorter than a second.
+        oscillation_m: how far the true position moved in it, peak to peak.
+        growth_1_s: the r of e^(r t) by which the swings grow; negative: they decay; None where nothing swings.
         outside_fraction: share of its ticks that are out of contact.
         displayed_stiffness_N_m: mean of total force over penetration, ticks in contact (Choi et al. 2022, V.B.2), but
             those whose penetration is a rounding error of the wall's position; None of none.
-        penetration_mean_m: of the measured position, ticks in contact; None of none.
-        force_ripple_N: what the commanded force swings by above 30 Hz, peak to peak; see ``ripple``.
-        force_swing_N: the commanded force as it is, peak to peak.
+        penetration_mean_m: mean penetration of the measured position, ticks in contact; None of none.
+        force_ripple_N: what the commanded force swings by above 30 Hz, peak to peak.
+        force_swing_N: what the commanded force swings by, peak to peak.
     """
 
     from_s: float
@@ -87,7 +88,13 @@ class MeasuredColumns(NamedTuple):
 
 
 class Extremes(NamedTuple):
-    """Extremes of a whole run: least and greatest position in m, greatest force in N."""
+    """Extremes of a whole run.
+
+    Attributes:
+        x_min_m: least true position of the device, of the motor where there is a cable.
+        x_max_m: greatest true position of the same body.
+        force_max_N: greatest force of the actuator, in magnitude.
+    """
 
     x_min_m: float
     x_max_m: float
