@@ -23,39 +23,28 @@ GENERATED = "*Generated from the code with this page's site.*"
 _API = """\
 # Python
 
-`haploop.api` is the front door. Nothing is imported before it is first used.
-
 ::: haploop.api
     options:
       show_root_toc_entry: false
       members: false
+"""
+# Modules of the Python interface with what they offer, each under a heading that its docstring explains.
+_OFFERED = (
+    ("Scenes", "haploop.launch.runs.loaded_scene", "load, LoadedScene"),
+    ("Runs", "haploop.launch.runs.result", "run, Result"),
+    ("Live runs", "haploop.api.live", "start, attach, LiveLoop"),
+    ("Studies", "haploop.api.studies", "sweep, advise, compare, dissipate, plot"),
+    ("What advise and compare return", "haploop.api.results", "AdviceResult, ComparisonResult"),
+    ("Reading a log", "haploop.logger.log.stream", "read, LogStream"),
+    ("What a log holds", "haploop.logger.log.recording", "Recording, Table"),
+    ("The table of a sweep", "haploop.tools.sweep.table", "SweepTable"),
+    ("Elements", "haploop.controller.dissipation.element", "Element, Motion"),
+)
+_OF_MODULE = """\
+## {}
 
-::: haploop.launch.runs.loaded_scene
-    options: {members: [load, LoadedScene], show_root_heading: false}
-
-::: haploop.launch.runs.result
-    options: {members: [run, Result], show_root_heading: false}
-
-::: haploop.api.live
-    options: {members: [start, attach, LiveLoop], show_root_heading: false}
-
-::: haploop.api.studies
-    options: {show_root_heading: false, members: [sweep, advise, compare, dissipate, plot]}
-
-::: haploop.api.results
-    options: {members: [AdviceResult, ComparisonResult], inherited_members: true, show_root_heading: false}
-
-::: haploop.logger.log.stream
-    options: {members: [read, LogStream], show_root_heading: false}
-
-::: haploop.logger.log.recording
-    options: {members: [Recording, Table], show_root_heading: false}
-
-::: haploop.tools.sweep.table
-    options: {members: [SweepTable], show_root_heading: false}
-
-::: haploop.controller.dissipation.element
-    options: {members: [Element, Motion], show_root_heading: false}
+::: {}
+    options: {{members: [{}], inherited_members: true, show_root_heading: false, heading_level: 3}}
 """
 
 
@@ -176,7 +165,7 @@ def summary() -> str:
     tables: dict[str, list[tuple[str, ...]]] = {"": []}
     for key, meaning in meanings.summary().items():
         table = key.partition(".")[0] if key.partition(".")[0] in _TABLES else ""
-        row = f"`{key}`", unit_of(key) or "–", meaning, _plain(shown.get(key) or "–")
+        row = f"`{key}`", unit_of(key), meaning, _plain(shown.get(key, ""))
         tables.setdefault(table, []).append(row)
     about = (
         "`summary.json`, `result.summary` and `haploop run --json`, which adds `directory` and `notes`, hold these "
@@ -232,7 +221,7 @@ def log() -> str:
     """Returns the page of the log's channels: the unit of every column, and what it means."""
     parts = ["# Log", GENERATED, _LOG]
     for topic, columns in meanings.columns().items():
-        rows = [(f"`{name}`", one.unit or "–", one.meaning) for name, one in columns.items()]
+        rows = [(f"`{name}`", one.unit, one.meaning) for name, one in columns.items()]
         parts += [f"## `{topic}`", _ABOUT[topic], _entries(("column", "unit", "meaning"), rows)]
     return "\n\n".join([*parts, "## `/events`", _EVENTS]) + "\n"
 
@@ -258,7 +247,7 @@ _EVENTS = "Maps, not columns: `timestamp` (s), `tick`, and the event as it was g
 
 def api() -> str:
     """Returns the page of the Python interface, whose content are docstrings."""
-    return _API
+    return "\n".join([_API, *(_OF_MODULE.format(*one) for one in _OFFERED)])
 
 
 PAGES = {
