@@ -10,7 +10,8 @@ from haploop.logger.verdict.measures import CROSSINGS, ROUNDING, SMALLEST_SWING_
 from haploop.view.look.spectrum import main_line
 from haploop.view.store.history import History
 
-# A slow swing, and one that has just ended, is looked for in so many windows; growth and decay are told beyond these ratios of the two halves.
+# A slow swing, and one that has just ended, is looked for in so many windows; growth and decay are told beyond these
+# ratios of the two halves.
 _LONG = 4
 _DIES, _GROWS = 0.5, 2.0
 # At rest, position stays within so many times what counts as a swing, and force within this share of the largest.
