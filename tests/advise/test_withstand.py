@@ -65,6 +65,30 @@ def test_where_the_attack_breaks_the_element_that_bore_most_the_next_is_attacked
     assert won.broken[0] >= stiffness_N_m
 
 
+@pytest.mark.parametrize(("of_five", "most", "size"), [(140.0, 1200.0, 2.5), (900.0, 900.0, 5.0)])
+def test_an_element_that_breaks_far_below_its_limit_is_tried_in_smaller_sizes_and_one_that_does_not_is_not(
+    of_five, most, size
+):
+    """Once 11 N s/m broke on a soft wall, and 7.8 N s/m, which bears 2.4 times the wall alone, was not tried."""
+    bears = {(): (1000.0, 800.0), (5.0,): (1600.0, of_five), (2.5,): (1400.0, 1200.0), (1.2,): (1100.0, 1000.0)}
+
+    def failure(wall, attacked):
+        [*sizes] = _sizes(wall)
+        known = max((of for of in bears if of <= (*sizes,)), default=())  # moved up a little: as the size below
+        return None if wall.stiffness_N_m < bears[known][attacked] else FAILS
+
+    trial: Any = SimpleNamespace(
+        of_jobs=lambda jobs: [[failure(wall, 0) for wall in job.walls] for job in jobs],
+        failures=lambda loop, some, cases: [failure(wall, 1) for wall in some],
+    )
+    limits = {sizes: Limit(0.98 * borne, borne, FAILS) for sizes, (borne, _) in bears.items()}
+    smaller = tuple(Best(DAMPING, sizes, limits[sizes], limits[sizes]) for sizes in ((2.5,), (1.2,)))
+    bests = [Best(NOTHING, (), limits[()], limits[()]), Best(DAMPING, (5.0,), limits[5.0,], limits[5.0,], smaller)]
+    won = withstand(LOOP, trial, rivals(bests), {})
+    assert 0.9 * most < won.bound_N_m < most
+    assert size <= won.best.values[0] < 2.0 * size
+
+
 def test_where_nothing_withstands_no_wall_is_advised():
     assert won_of({NOTHING: (1000.0, 1.0), DAMPING: (1600.0, 1.0)}).bound_N_m == 0.0
 

@@ -33,6 +33,7 @@ from haploop.tools.advise.withstand import (
     Broken,
     Rival,
     advised,
+    is_less,
     rivals,
     withstand,
 )  # fmt: skip
@@ -211,6 +212,8 @@ def in_corners(
     for place, best in enumerate(bests):
         of_family = {values: limit for (family, values), limit in safe.items() if family is best.family}
         if of_family:
-            values = max(of_family, key=lambda some: (of_family[some].stiffness_N_m, [-value for value in some]))
-            bests[place] = Best(best.family, values, known[best.family, values], of_family[values])
+            ranked = sorted(of_family, key=lambda some: (-of_family[some].stiffness_N_m, some))
+            first, *rest = (Best(best.family, some, known[best.family, some], of_family[some]) for some in ranked)
+            less = tuple(each for each in rest if is_less(each.values, first.values))
+            bests[place] = replace(first, smaller=less)
     return bests

@@ -25,6 +25,8 @@ WORTH = 1.1
 _SOFTER = (0.8, 0.62, 0.48, 0.35, 0.25, 0.15, 0.08, 0.03)
 # A wall that does not withstand the attack is lowered by this, to this share at least.
 _LOWER, _LEAST = 0.97, 0.16
+# Below this share of its limit in every corner, an element is tried in a smaller size.
+_FALLEN = 0.5
 # So much stiffer walls have to withstand it, too: where a count lies in the hold is chance, and differs with each.
 BEYOND = (1.0, 1.02, 1.04)
 # Times that parameters are moved, each time in the corners that were hardest on those before.
@@ -43,12 +45,14 @@ class Best:
     Attributes:
         nominal: the limit of the loop as described, at the holds tried first.
         safe: the limit in every corner, where the family came that far; None where a simpler one bears as much.
+        smaller: the same with no more of any parameter, those that bear most in every corner first.
     """
 
     family: Family
     values: Values
     nominal: Limit
     safe: Limit | None = None
+    smaller: tuple[Best, ...] = ()
 
 
 @dataclass
@@ -61,6 +65,7 @@ class Rival:
         floor_N_m: the wall is not lowered below; None until softer walls were tried.
         hardest: corners known to be hard on its walls, the hardest first.
         broke: cases that broke stiffer ones under attack.
+        most: a larger size, whose walls had to be lowered far: parameters are moved to less than that; None without.
     """
 
     best: Best
@@ -70,6 +75,7 @@ class Rival:
     floor_N_m: float | None = None
     hardest: tuple[Corner, ...] = ()
     broke: list[Case] = field(default_factory=list)
+    most: Values | None = None
 
 
 def rivals(bests: Sequence[Best], hardest: tuple[Corner, ...] = ()) -> list[Rival]:
@@ -99,15 +105,17 @@ def advised(bests: Sequence[Best]) -> Best:
 def withstand(loop: Scene, trial: Trial, some: Sequence[Rival], of: Ranges) -> Rival:
     """Lowers the walls of rivals until that of the one with the stiffest withstands every attack, and returns that one.
 
-    Its bound is the stiffness then, 0 where none withstands; others have lower ones.
+    Its bound is the stiffness then, 0 where none withstands; others have lower ones. A smaller size of an element joins
+    them once the wall of a larger one had to be lowered far below what it bears in every corner.
     """
+    some = [*some]
     while True:
         rival = max(some, key=lambda each: each.bound_N_m / each.worth)
         if rival.floor_N_m is None:
             _prepare(loop, trial, rival, of)
         elif rival.bound_N_m < max(LEAST_N_M, rival.floor_N_m):
             rival.bound_N_m = 0.0
-            if not any(each.bound_N_m for each in some):
+            if not (rival.best.smaller or any(each.bound_N_m for each in some)):
                 return rival
         elif broken := _breaks(loop, trial, rival, of):
             rival.broken = broken
@@ -117,6 +125,23 @@ def withstand(loop: Scene, trial: Trial, some: Sequence[Rival], of: Ranges) -> R
             rival.bound_N_m = rounded_down(rival.bound_N_m * _LOWER)
         else:
             return rival
+        if rival.best.smaller and rival.best.safe and rival.bound_N_m < _FALLEN * rival.best.safe.stiffness_N_m:
+            some.append(smaller_than(rival))
+            rival.best = replace(rival.best, smaller=())
+
+
+def smaller_than(rival: Rival) -> Rival:
+    """Returns the rival with less of its element, in the corners and cases known to be hard on it."""
+    first, *rest = rival.best.smaller
+    assert first.safe
+    best = replace(first, smaller=tuple(each for each in rest if is_less(each.values, first.values)))
+    hard = rival.hardest, [*rival.broke]
+    return Rival(best, first.safe.stiffness_N_m, rival.worth, None, None, *hard, most=rival.best.values)
+
+
+def is_less(some: Values, others: Values) -> bool:
+    """Tells whether no parameter is larger, and one is smaller."""
+    return some != others and all(value <= other for value, other in zip(some, others, strict=True))
 
 
 def _prepare(loop: Scene, trial: Trial, rival: Rival, of: Ranges) -> None:
@@ -152,6 +177,8 @@ def _refine(loop: Scene, trial: Trial, rival: Rival, of: Ranges) -> None:
     [best], tried = found([rival.best.values], ladder(near * 0.7, near, 1.2)), {rival.best.values}
     while near := best[1].stiffness_N_m:
         new = [other for other in beside(best[0]) if other not in tried]
+        if most := rival.most:
+            new = [other for other in new if is_less(other, most)]
         tried |= set(new)
         more = max(found(new, ladder(near, near * 1.5, 1.07)), key=lambda each: each[1].stiffness_N_m, default=best)
         if more[1].stiffness_N_m <= near * 1.01:
