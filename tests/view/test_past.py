@@ -46,6 +46,8 @@ def test_a_recorded_run_is_opened_with_its_numbers_events_and_verdict(recorded):
     shown = decode(snapshot(session.history, Viewport(0.2, 2000, 1.0), session.changes))
     x = shown["tables"]["position"]["values"]["x"]
     assert np.array_equal(x, recorded["/plant"]["x"][8000:10000].astype(np.float32))
+    longer = decode(snapshot(session.history, Viewport(10.0, 2000), session.changes))
+    assert (longer["from_s"], longer["to_s"]) == (0.0, 1.501)  # the end of the last tick is drawn, too
 
 
 def test_a_viewer_shows_one_recorded_run_and_draws_another_over_it(recorded):

@@ -45,10 +45,13 @@ def snapshot(
     whose rows are the two extremes of consecutive buckets, rising or falling as they do. Position and total force of
     ``overlay``, another run, come with them. Where ``beside`` is asked for, there is an overview of the whole run, too,
     and what the page's panel asks for, to which ``changes`` belong. A table without data is left out. ``coarse``
-    in the header tells that the interval begins before what is held in full.
+    in the header tells that the interval begins before what is held in full. Of a run that has ended the interval does
+    not reach beyond its end, but for what ``overlay`` has there.
     """
     rate = history.time.control_rate
     from_tick, to_tick = _window(history, viewport)
+    if history.stop_tick is not None and not overlay:
+        to_tick = min(to_tick, max(history.end_tick, from_tick + 1))
     known_from = to_tick if history.first_tick is None else history.first_tick
     first, end = max(from_tick, known_from), min(to_tick, history.end_tick)
     tables: list[Table | None] = []

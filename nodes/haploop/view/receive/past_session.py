@@ -36,6 +36,7 @@ class PastSession(RunSession):
         backfill = Backfill(self.out, scene, time, self.events)
         backfill.read()
         self.history = backfill.history
+        self.history.stop_tick = self.history.end_tick if self.history.stop_tick is None else self.history.stop_tick
         self.read_summary()
 
     @property
