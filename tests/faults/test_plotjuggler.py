@@ -207,7 +207,7 @@ def test_stopped_for_long_it_costs_the_run_nothing_and_is_told_what_it_missed(ru
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("plotjuggler", "--run", "zzz"), "No run is live"),
+        (("plotjuggler", "--run", "zzz", "--port", "0"), "No run is live"),
         (("plotjuggler", "--out", "somewhere"), "--out belongs to attach logger"),
         (("print", "--port", "9872"), "--port belongs to attach plotjuggler"),
         (("plotjuggler", "--port", "70000"), "65535"),
