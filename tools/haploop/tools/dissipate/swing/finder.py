@@ -14,30 +14,22 @@ from haploop.tools.dissipate.swing.buzz import (
     Buzz,
     Overtone,
     Several,
-    Span,
     Word,
 )
-from haploop.tools.dissipate.swing.course import course, widths
+from haploop.tools.dissipate.swing.course import widths
 from haploop.tools.dissipate.swing.fed import fed_W
 from haploop.tools.dissipate.swing.hidden import HiddenFinder
-from haploop.tools.dissipate.swing.lines import Slower, fast_rms_m, is_overtone, overtone_of, swing, within_counts
+from haploop.tools.dissipate.swing.lasting import HOPS, NEEDED, lasting, make_buzz
+from haploop.tools.dissipate.swing.lines import Slower, fast_rms_m, overtone_of, swing, within_counts
 from haploop.tools.dissipate.swing.several import SeveralFinder
-from haploop.tools.dissipate.swing.windows import THIRD, End, Window, along_m, widest_m
+from haploop.tools.dissipate.swing.windows import End, Window, widest_m
 from haploop.view.look.spectrum import Line, main_line
 
-# The windows are a quarter of one apart; so many after the first have to swing as well for a swing to last.
-_HOPS = 4
-_NEEDED = _HOPS
 # It goes on to the end of a part whose last half second it swings through, this share of the window before as wide.
 _GOES_ON = 0.9
-# It does not decay below this share while it lasts: what is struck rings shorter.
-_KEPT = 0.7
 # A gap of no more than this, after so many times as many samples without one, is bridged by a straight line: the swing
 # loses no more of its width than the gap is of a window.
 _BRIDGED_S, _BETWEEN = 0.01, 10
-# The first window that a swing fills which began within the first, by number; one before it is left out where it is
-# less than ``_KEPT`` as wide.
-_FULL = _HOPS - 1
 
 
 class BuzzFinder:
@@ -108,7 +100,7 @@ class BuzzFinder:
             self._t_s, self._motion = self._t_s[self._next :], self._motion[:, self._next :]
             x_m, true_x_m, force_N = self._motion[:, : self._size]
             self._look(self._t_s[: self._size], x_m, true_x_m, force_N, delay_s)
-            self._next = self._size // _HOPS
+            self._next = self._size // HOPS
 
     def _bridged(self, to_s: float) -> int:
         """Returns how many samples are missing in the gap up to this time; 0 where it is not bridged."""
@@ -119,7 +111,7 @@ class BuzzFinder:
 
     def _look(self, t_s: Floats, x_m: Floats, true_x_m: Floats, force_N: Floats, delay_s: float) -> None:
         from_s, to_s = float(t_s[0]), float(t_s[-1])
-        inside_s = (to_s - from_s) / _HOPS
+        inside_s = (to_s - from_s) / HOPS
         rate_Hz = (len(t_s) - 1) / (to_s - from_s)
         line = swing(x_m, rate_Hz, self._band)
         if line and (count_m := within_counts(line, x_m)):
@@ -168,72 +160,9 @@ class BuzzFinder:
         return {last[-1].to_s: End(float(t_s[-1]), (float(t_s[0]), lasts_s), along, width_m)}
 
     def buzz(self) -> Buzz | None:
-        """Returns the buzz; None where there was none, or nothing can be said.
-
-        Where one stretch lasts, shorter ones at its frequencies count, too, as long as they are as wide.
-        """
+        """Returns the buzz; None where there was none, or nothing can be said."""
         lasting, _ = self._parted()
-        if not lasting:
-            return None
-        kept = [window for stretch in lasting for window in stretch]
-        swings_Hz = [window.line.frequency_Hz for window in kept]
-        least_Hz, most_Hz, width_m = min(swings_Hz), max(swings_Hz), max(window.line.width for window in kept)
-
-        def is_alike(window: Window) -> bool:
-            near_Hz = self._band.resolved_Hz
-            is_near = least_Hz - near_Hz < window.line.frequency_Hz < most_Hz + near_Hz
-            return is_near and window.line.width >= _KEPT * width_m
-
-        shorter = [window for stretch in self._stretches for window in stretch if is_alike(window)]
-        told = sorted({*kept, *shorter}, key=lambda window: window.to_s)
-        fed = [window.fed for window in told if window.fed is not None]
-        given_W, moved_W = np.mean(fed, axis=0).tolist() if fed else (None, 0.0)
-        # What still swings at the end of a part goes on to it.
-        ends = self._part_ends | self._end_of_part()
-        spans = self._joined(told, ends)
-        last = told[-1 if told[-1].to_s in ends else -min(THIRD + 1, len(told))]
-        width_m, word = max(span.width_m for span in spans), None
-        first_m, last_m = told[min(THIRD, len(told) - 1)].line.width, last.line.width
-        least_m = min(window.line.width for window in told)
-        if len(spans) == 1:
-            found_m, error_m = along_m(told, ends)
-            word = course(found_m, error_m)
-            width_m = max(window.line.width for window in told)
-            if word != "stayed":
-                first_m, last_m, least_m = found_m[0], found_m[-1], found_m.min()
-                width_m = max(width_m, found_m.max())
-            spans = (spans[0]._replace(width_m=float(width_m)),)
-        return Buzz(
-            float(np.median(swings_Hz)),
-            0.5 * self._band.resolved_Hz,
-            least_Hz,
-            most_Hz,
-            spans,
-            float(width_m),
-            word,
-            float(first_m),
-            float(last_m),
-            float(least_m),
-            given_W,
-            moved_W,
-        )
-
-    def _joined(self, told: list[Window], ends: dict[float, End]) -> tuple[Span, ...]:
-        """Joins windows of about one frequency; no pause shorter than a window is told."""
-        spans = list[Span]()
-        last_Hz = 0.0
-        for window in told:
-            end, at_Hz = ends.get(window.to_s), window.line.frequency_Hz
-            to_s, width_m = end.to_s if end else window.to_s, max(window.width_m, end.width_m if end else 0.0)
-            is_near = spans and window.from_s <= spans[-1].to_s + self._band.window_s
-            if is_near and abs(at_Hz - last_Hz) < self._band.resolved_Hz:
-                from_s, until_s, least_Hz, most_Hz, widest_m = spans[-1]
-                joined = max(until_s, to_s), min(least_Hz, at_Hz), max(most_Hz, at_Hz), max(widest_m, width_m)
-                spans[-1] = Span(from_s, *joined)
-            else:
-                spans.append(Span(window.from_s, to_s, at_Hz, at_Hz, width_m))
-            last_Hz = at_Hz
-        return tuple(spans)
+        return make_buzz(lasting, self._stretches, self._part_ends | self._end_of_part(), self._band)
 
     def _slower(self) -> list[Slower]:
         """Returns the slower motions of which a line may be an overtone."""
@@ -246,21 +175,8 @@ class BuzzFinder:
     def _parted(self) -> tuple[list[list[Window]], list[Overtone]]:
         """Returns of each stretch the part that lasts, and what was left out for an overtone of a slower motion."""
         slower = self._slower()
-        parts = [self._lasting(stretch, slower) for stretch in self._stretches]
+        parts = [lasting(stretch, slower) for stretch in self._stretches]
         return [kept for kept, _ in parts if kept], [*self._left_out, *(one for _, left in parts for one in left)]
-
-    def _lasting(self, stretch: list[Window], slower: list[Slower]) -> tuple[list[Window], list[Overtone]]:
-        """Returns the part of a stretch that lasts without decaying; what is an overtone of the motion by itself."""
-        widths = [window.line.width for window in stretch]
-        decays = [widths[i + _NEEDED] < _KEPT * max(widths[i : i + _NEEDED]) for i in range(len(widths) - _NEEDED)]
-        lasting = [i for i, of in enumerate(decays) if not of]
-        kept = stretch[lasting[0] : lasting[-1] + _NEEDED + 1] if lasting else []
-        if kept:
-            frequency_Hz = float(np.median([window.line.frequency_Hz for window in kept]))
-            width_m = max(window.line.width for window in kept)
-            if of := next((of for of in slower if is_overtone(frequency_Hz, width_m, of)), None):
-                return [], [Overtone(window.line, of.line.frequency_Hz) for window in kept]
-        return _filled(kept), []
 
     def several(self) -> Several | None:
         """Returns the swings at several frequencies at once; None where there were none that last."""
@@ -268,13 +184,13 @@ class BuzzFinder:
 
     def fast_rms_m(self) -> float:
         """Returns by how much it moves above 15 Hz, r.m.s., at least in every window of a second; 0 of less."""
-        rows = [min(self._fast_m[at : at + _NEEDED + 1]) for at in range(len(self._fast_m) - _NEEDED)]
+        rows = [min(self._fast_m[at : at + NEEDED + 1]) for at in range(len(self._fast_m) - NEEDED)]
         return max(rows, default=0.0)
 
     def overtone(self) -> Overtone | None:
         """Returns the widest line that lasted and was left out for an overtone; None where there was none."""
         _, left = self._parted()
-        lasted = left if len(left) > _NEEDED else []
+        lasted = left if len(left) > NEEDED else []
         some = [*lasted, *self._several.found(self._slower())[1]]
         return max(some, key=lambda each: each.line.width, default=None)
 
@@ -287,10 +203,3 @@ class BuzzFinder:
         if self.hidden.found:
             return "cannot say"
         return "none seen" if self.longest_s >= LASTS_S - 1e-9 and self.rate_Hz >= LEAST_RATE_HZ else "cannot say"
-
-
-def _filled(stretch: list[Window]) -> list[Window]:
-    """Returns a stretch without the windows at its beginning of which the swing fills a part."""
-    widths = [window.line.width for window in stretch]
-    first = next((i for i, width in enumerate(widths) if width >= _KEPT * widths[min(_FULL, len(widths) - 1)]), 0)
-    return stretch[first:]
