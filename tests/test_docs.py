@@ -15,6 +15,7 @@ import typer.main
 
 from haploop.launch.scene.bundled import bundled
 from haploop.tools.cli.app import app
+from helpers.documented import command_lines
 
 HOUSE = Path(__file__).parents[1]
 DOCUMENTS = [HOUSE / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "protocol/README.md")]
@@ -177,12 +178,6 @@ def wrong_words(line: str) -> list[str]:
         return [words[0]]
     known = {word for one in command.params for word in (*one.opts, *one.secondary_opts)} | {"--help", "-h"}
     return [word for word in words[1:] if word.startswith("--") and word.partition("=")[0] not in known]
-
-
-def command_lines(text: str) -> list[str]:
-    """Lines of code blocks that begin with ``haploop``, those that go on with a backslash in one."""
-    blocks = re.findall(r"^```(?:bash|sh)?\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-    return [line for block in blocks for line in block.replace("\\\n", " ").splitlines() if line.startswith("haploop ")]
 
 
 @pytest.mark.slow
