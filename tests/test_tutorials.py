@@ -26,7 +26,7 @@ TUTORIALS = HOUSE / "docs/tutorials"
 GOES_ON = ("--set", "duration=600", "--pace", "1")
 # What waits for the next run, or for the page of a run to be closed, is ended by Ctrl-C.
 STAYS = {"--view", "plotjuggler"}
-# What takes minutes has a test of its own.
+# What takes minutes is left out.
 MINUTES = ("advise",)
 TAP = [f"{k / 1000},{math.sin(2 * math.pi * k / 1000) + 0.5 * math.sin(50 * math.pi * k / 1000)}" for k in range(3000)]
 # Files that a reader has.
@@ -230,18 +230,6 @@ def check_map(reader: Reader) -> None:
     ]
     assert steady
     assert all("only friction holds it" in provisos for provisos in steady)
-
-
-@pytest.mark.long
-def test_readme_has_the_walls_that_advise_comes_to(reader: Reader) -> None:
-    [words] = [one for block in blocks((HOUSE / "README.md").read_text(encoding="utf-8")) for one in commands(block)
-               if one[0] == "advise"]  # fmt: skip
-    safe, damping = figures(r"The answer is ([\d.]+) N/mm with ([\d.]+) N s/m of damping")
-    (measured,) = figures(r'`--delay "2 ms"`, a delay that was measured, gives ([\d.]+) N/mm')
-    said = reader.runs(words, 30 * PATIENCE_S)
-    assert f"safe up to    {safe:g} N/mm with {damping:g} N s/m of damping" in said
-    said = reader.runs([*words[:-1], "runs/measured", "--delay", "2 ms"], 30 * PATIENCE_S)
-    assert f"safe up to    {measured:g} N/mm" in said
 
 
 def test_a_command_that_does_not_run_a_file_that_is_none_and_a_wrong_figure_are_found(reader: Reader) -> None:
