@@ -144,21 +144,58 @@ def test_a_swing_that_is_over_is_told_to_have_died_until_two_seconds_show_none_o
     assert (stops(2.55).word, stops(2.55).rests) == ("dying away", False)
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_whatever_moved_in_the_last_two_seconds_is_never_unseen_and_what_flickers_by_a_count_is(seed):
-    """Pushes, bursts of a buzz and slow swings, drawn; all of them more than four counts wide."""
+def test_a_swing_of_the_force_that_is_over_is_told_too_until_two_seconds_show_none_of_it():
+    def stops(at_s):
+        return seen(deep, lambda t: 0.5 + np.where(t < at_s, 0.1 * np.sin(700.0 * t), 0.0))
+
+    over, gone = stops(2.45), stops(0.99)
+    assert (over.word, over.ripple_N) == ("dying away", pytest.approx(0.0, abs=1e-12))
+    assert over.why.endswith("in the last 2 s the force rippled by 0.202 N, in the last 0.5 s by 0 N.")
+    assert (stops(2.7).word, gone.word) == ("force ripples", "no swing seen")
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_whatever_moved_or_rippled_in_the_last_two_seconds_is_never_unseen(seed):
+    """Pushes, bursts of a buzz, also between ticks, slow swings and ripples of the force, drawn."""
     draw = np.random.default_rng(seed)
-    begins, lasts, size = draw.uniform(1.0, 2.9), draw.uniform(0.02, 0.5), draw.uniform(5.0, 200.0) * COUNT_M
-    f = np.exp(draw.uniform(np.log(0.5), np.log(200.0)))
+    begins, lasts = draw.uniform(1.05, 2.9), draw.uniform(0.02, 0.5)
+    size = np.exp(draw.uniform(np.log(2.5), np.log(200.0))) * COUNT_M
+    f = draw.choice([1000.0, np.exp(draw.uniform(np.log(4.0), np.log(200.0)))])
 
-    def moves(t):
-        burst = np.sin(2 * np.pi * f * (t - begins)) if seed % 2 else np.minimum((t - begins) / lasts, 1.0)
-        return -5e-3 + size * np.where((t > begins) & ((t < begins + lasts) | (seed % 2 == 0)), burst, 0.0)
+    def moves(t, kind):
+        on = (t > begins) & (t < begins + lasts)
+        shapes = {
+            "push": np.clip((t - begins) / lasts, 0.0, 1.0),
+            "burst": on * np.sin(2 * np.pi * f * (t - begins)),
+            "slow": np.sin(2 * np.pi * draw.uniform(0.3, 4.0) * t),
+        }
+        return shapes[kind]
 
-    rows = moves(np.arange(1000, 3000) / 1e3)
-    assert seen(moves).word != "no swing seen" or np.ptp(rows) <= 4 * COUNT_M
+    for kind in ("push", "burst", "slow"):
+        found = seen(lambda t, kind=kind: -5e-3 + size * moves(t, kind))
+        assert found.word in ("swinging", "growing", "dying away", "moving"), kind
+    ripple = seen(deep, lambda t: 0.5 + 0.1 * moves(t, "burst"))
+    assert ripple.word in ("dying away", "force ripples")
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_what_is_said_to_rest_moved_no_further_than_told_in_the_time_told(seed):
+    """Some motions are a little wider than what counts, others a little narrower; a flicker by one count is rest."""
+    draw = np.random.default_rng(seed)
+    size, f, since = draw.uniform(0.2, 4.0) * COUNT_M, draw.uniform(0.05, 0.4), int(draw.integers(0, 2400))
     flickers = draw.integers(0, 2, 30_000) * COUNT_M
-    assert seen(lambda t: -5e-3 + flickers[np.rint(t * 1e4).astype(int)]).word == "no swing seen"
+
+    def drifts(t):
+        return -5e-3 + 0.5 * size * np.sin(2 * np.pi * f * t)
+
+    found = seen(drifts, since=since)
+    width = np.ptp(drifts(np.arange(round(found.from_s * 1e4), round(found.to_s * 1e4)) / 1e4))
+    assert found.from_s == max(since, 1000) / 1e3
+    assert (found.word == "no swing seen") == (width <= 2.0 * COUNT_M)
+    if found.word == "no swing seen":
+        assert f"the position stayed within {width * 1e6:.3g} µm" in found.why
+    rests = seen(lambda t: -5e-3 + flickers[np.rint(t * 1e4).astype(int)], since=since)
+    assert (rests.word, rests.rests) == ("no swing seen", True)
 
 
 def recorded(tmp_path, **values):

@@ -14,8 +14,9 @@ from haploop.view.store.history import History
 # ratios of the two halves.
 _LONG = 4
 _DIES, _GROWS = 0.5, 2.0
-# At rest, position stays within so many times what counts as a swing, and force within this share of the largest.
-_REST, _RIPPLE, _LEAST_RIPPLE_N = 4.0, 0.02, 1e-3
+# At rest, position stays within so many times what counts as a swing, once to either side; beyond rounding. Force stays
+# within this share of the largest.
+_REST, _RIPPLE, _LEAST_RIPPLE_N = 2.0 + 1e-6, 0.02, 1e-3
 _WHY = {
     "settling": "Its numbers are those so far: no word before {window:g} s in one regime, since {begin}.",
     "no contact": "No tick of the last {window:g} s was in contact.",
@@ -30,8 +31,10 @@ _WHY = {
     "moving": "In the last {seen:.3g} s the position moved by {width_um:.3g} µm and swung through the middle "
     "of its motion {crossings} times: a push of the hand, or a swing slower than can be told.",
     "force ripples": "The position rests, but in the last {window:g} s the force rippled by {ripple_N:.3g} N.",
-    "no swing seen": "In the last {seen:.3g} s the position stayed within {width_um:.3g} µm, the force within "
-    "{ripple_N:.3g} N. This says nothing of stability.",
+    "ripple over": "The position rests; in the last {seen:.3g} s the force rippled by {most_N:.3g} N, in the last "
+    "{window:g} s by {ripple_N:.3g} N.",
+    "no swing seen": "In the last {seen:.3g} s the position stayed within {width_um:.3g} µm, the force in no "
+    "{window:g} s of them swung by more than {most_N:.3g} N about its straight trend. This says nothing of stability.",
     "not finite": "A position or force is no finite number.",
 }
 
@@ -99,18 +102,16 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     if end - first < 4:
         return Sight("settling", _WHY["settling"].format(window=WINDOW_S, begin=by), first / rate, end / rate, True)
     long_first = max(begin, end - _LONG * window)
-    slow, slow_force = recent[:, ::n]
-    x, force = recent[:, (first - long_first) * n :]
-    if not (np.isfinite(x).all() and np.isfinite(force).all() and np.isfinite(slow).all()):
+    if not np.isfinite(recent).all():
         return Sight("not finite", _WHY["not finite"], first / rate, end / rate)
-    swing_m = max(resolution_m, SMALLEST_SWING_M)
-    (fast, fast_growth), (crossings, growth) = _swings(x, swing_m), _swings(slow, swing_m)
-    rests = bool(np.ptp(x) <= swing_m)
+    newest, swing_m = recent[:, (first - long_first) * n :], max(resolution_m, SMALLEST_SWING_M)
+    (fast, fast_growth), (crossings, growth) = _swings(newest[0], swing_m), _swings(recent[0, ::n], swing_m)
+    rests = bool(np.ptp(newest[0]) <= swing_m * (1.0 + 1e-6))
     if fast >= CROSSINGS:
-        crossings, growth, long_first, slow, slow_force = fast, fast_growth, first, x[::n], force[::n]
+        crossings, growth, long_first, recent = fast, fast_growth, first, newest
     seen_s = (end - long_first) / rate
-    width, ripple = float(np.ptp(slow)), float(np.ptp(_flat(force)))
-    why = ""
+    width, ripples = float(np.ptp(recent[0])), _ripples(recent[1], window * n)
+    ripple, why = ripples[0][0], ""
     if not inside[-window:].any():
         word = "no contact"
     elif crossings >= CROSSINGS and rests:
@@ -119,20 +120,23 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
         word = "dying away" if growth < _DIES else "growing" if growth > _GROWS else "swinging"
     elif width > _REST * swing_m:
         word = "moving"
+    elif ripples[0][1]:
+        word = "force ripples"
+    elif any(counts for _, counts in ripples):
+        word, why = "dying away", "ripple over"
     else:
-        most = max(_LEAST_RIPPLE_N, _RIPPLE * float(np.abs(force).max()))
-        word = "force ripples" if ripple > most else "no swing seen"
+        word = "no swing seen"
     so_far_word, word = word, "settling" if so_far else word
-    line = main_line(slow, rate) if width > 2.0 * swing_m else None
-    line = line or (main_line(slow_force, rate) if ripple else None)
+    line = main_line(recent[0, ::n], rate) if width > _REST * swing_m else None
+    line = line or (main_line(recent[1, ::n], rate) if ripple else None)
     why = _WHY[word if so_far else why or word].format(
         window=WINDOW_S, begin=by, seen=seen_s, crossings=crossings, growth=growth, swing_um=swing_m * 1e6,
-        width_um=width * 1e6, ripple_N=ripple,
+        width_um=width * 1e6, ripple_N=ripple, most_N=max(ripples)[0],
     )  # fmt: skip
     return Sight(
-        word, why, long_first / rate, end / rate, so_far, float(np.ptp(_flat(x))), ripple,
+        word, why, long_first / rate, end / rate, so_far, float(np.ptp(_flat(newest[0]))), ripple,
         line.frequency_Hz if line else None, stiffness if inside[first - end :].any() else None,
-        float(np.ptp(force)), so_far_word, rests,
+        float(np.ptp(newest[1])), so_far_word, rests,
     )  # fmt: skip
 
 
@@ -148,6 +152,14 @@ def _contact(history: History, first: int, end: int) -> tuple[np.ndarray, float 
     newest += max(0, len(inside) - window_ticks(history.time.control_rate))
     ratio = -total[newest] * history.at_work.into_wall / depth[newest]
     return inside, float(ratio.mean()) if np.isfinite(ratio).all() else None
+
+
+def _ripples(force: np.ndarray, size: int) -> list[tuple[float, bool]]:
+    """Returns the width of force about its straight trend in windows of a size, the newest first, and if it counts."""
+    windows = [force[max(0, stop - size) : stop] for stop in range(len(force), 3, -size)]
+    widths = [float(np.ptp(_flat(window))) for window in windows]
+    least = [max(_LEAST_RIPPLE_N, _RIPPLE * float(np.abs(window).max())) for window in windows]
+    return [(width, width > above) for width, above in zip(widths, least, strict=True)]
 
 
 def _flat(samples: np.ndarray) -> np.ndarray:
