@@ -123,12 +123,16 @@ def test_no_verdict_of_steady_stands_alone_beside_what_moves_still(stand_in, pag
 
 @pytest.mark.slow
 def test_the_force_that_ripples_in_the_run_and_that_of_its_pushed_copies_are_told_apart(stand_in, page):
-    window = {"window": {"force_ripple_N": 0.2}}
+    window = {"window": {"force_ripple_N": 0.2, "from_s": 2.5, "oscillation_m": 5.5e-3, "force_swing_N": 0.6}}
     stand_in.state(
         **ENDED | {"summary": SUMMARY | window | {"stability": SUMMARY["stability"] | {"force_ripple_N": 0.0}}}
     )
     expect(page.locator("#summary")).to_contain_text("pushed, it ripples0 N above 30 Hz")
     expect(page.locator("#summary")).to_contain_text("its own ripple200 mN above 30 Hz")
+    expect(page.locator("#summary")).to_contain_text("oscillation, last 500 ms5.50 mm p-p")
+    expect(page.locator("#summary")).to_contain_text("commanded force600 mN p-p")
+    expect(page.locator(".figures")).to_contain_text("applied force p-p")
+    expect(page.locator("#ripple")).to_have_text("410 mN")
 
 
 @pytest.mark.slow

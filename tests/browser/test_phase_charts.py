@@ -55,6 +55,27 @@ def test_pressing_and_releasing_are_told_apart_anew_in_every_snapshot(stand_in, 
         assert not any(seen(page, "loop", parts, other)), colour
 
 
+def test_where_nothing_touches_and_where_there_is_no_spectrum_no_axes_stand_without_a_line(stand_in, page):
+    free = [-1e-3] * 20
+    for depth, force, told in ((free, [0.0] * 20, "Not in contact in this time."), (free, [0.1] * 20, "")):
+        loop = table("loop", 0.0, 1e-3, ("penetration", "m", "", depth), ("force", "N", "", force))
+        stand_in.show(snapshot(0.0, 0.02, {**loop, "stiffness": 100.0}))
+        expect(page.locator("#loop .absent")).to_have_text(told)
+        expect(page.locator("#loop .plot")).to_be_visible(visible=not told)
+    page.click("[data-panel=spectrum]")
+    expect(page.locator("#spectrum > .about")).to_have_text("Too few samples for a spectrum.")
+    expect(page.locator("#spectrum canvas:visible")).to_have_count(0)
+    heights = [1e-3 if i == 30 else 0.0 for i in range(500)]
+    spectrum = table("spectrum", 1.0, 1.0, ("x", "m", "position", heights), ("force", "N", "force", heights))
+    line = {"frequency_Hz": 31.0, "width": 2e-3}
+    lines = {"x": line, "force": None, "from_s": 0.0, "to_s": 2.0}
+    stand_in.show(snapshot(0.0, 2.0, spectrum, lines=lines))
+    expect(page.locator("#spectrum .line-name")).to_have_text(
+        ["position, main line: 31.0 Hz, 2.00 mm p-p", "applied force, no line stands out"]
+    )
+    expect(page.locator("#spectrum canvas:visible")).to_have_count(2)
+
+
 def test_the_ideal_spring_is_as_steep_as_the_wall(stand_in, page):
     """At the deepest point its line and a loop of the same stiffness meet; of half the stiffness, they do not."""
     depth = [0.002 * math.sin(math.pi * i / 199) for i in range(200)]

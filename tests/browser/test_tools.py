@@ -152,7 +152,7 @@ def test_another_live_run_is_told_and_any_run_can_be_opened_or_drawn_over(stand_
     expect(page.locator("#runs")).to_be_hidden()
     stand_in.tell(RUNS)
     expect(page.locator("#how-many")).to_have_text("1 other run is live")
-    names = ["abc123: one", "def456: two", "wall-1: first wall, steady, 1 Jan 12:00"]
+    names = ["none on show", "abc123: one", "def456: two", "wall-1: first wall, steady, 1 Jan 12:00"]
     expect(page.locator("#run option")).to_have_text(names)
     assert order(stand_in, page, lambda: page.click("#open-other")) == ("open", {"run": "def456"})
     assert page.input_value("#run") == "abc123"

@@ -182,7 +182,7 @@ def test_an_element_has_one_name_and_one_colour_in_all_panels_also_where_another
     forces, speeds = lines["Force by part"], lines["Own columns: speed"]
     for name in ("brake", "brake-2"):
         assert speeds[name] == forces[name]
-        assert lines["Energy taken out of the device (given to it below 0)"][name] == forces[name]
+        assert lines["Energy out of the device (below 0: into it)"][name] == forces[name]
     [panel] = [ax for ax in panels if ax.get_title("left") == "Force by part"]
     legend = panel.get_legend()
     assert legend

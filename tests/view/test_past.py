@@ -50,6 +50,18 @@ def test_a_recorded_run_is_opened_with_its_numbers_events_and_verdict(recorded):
     assert (longer["from_s"], longer["to_s"]) == (0.0, 1.501)  # the end of the last tick is drawn, too
 
 
+def test_the_loop_of_a_run_that_has_ended_goes_to_its_end_and_no_further(tmp_path, monkeypatch):
+    """The row of its end state is filled with numbers that are none, of which a wall's curve would be, too."""
+    monkeypatch.chdir(tmp_path)
+    damped = {"duration": 0.6, "wall.position": 0.001, "wall.kind": "kelvin-voigt", "wall.damping": 1.0}
+    run(load("fig6c").set(damped), out="runs/damped")
+    session = PastSession(next(past for past in LiveRuns().past() if past.id == "damped"))
+    loop = decode(snapshot(session.history, Viewport(0.2, 2000), session.changes))["tables"]["loop"]
+    assert all(np.isfinite(values).all() for values in loop["values"].values())
+    assert len(loop["values"]["force"]) == 2000 - 10
+    assert np.isfinite(loop["curve"]).all()
+
+
 def test_a_viewer_shows_one_recorded_run_and_draws_another_over_it(recorded):
     async def play():
         viewer = Viewer(LiveRuns(), None, from_start=True)

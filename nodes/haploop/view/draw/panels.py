@@ -70,7 +70,7 @@ def _own(look: Look) -> Sent:
 
 def _last(history: History, series: LodSeries, first: int, end: int) -> tuple[int, int]:
     """Returns the ticks of a phase plot, the last that a series holds in full, (first, end); (0, 0) for none."""
-    end = min(end, series.end_tick)
+    end = min(end, series.end_tick, end if history.stop_tick is None else history.stop_tick)
     first = max(first, series.full_from_tick, end - round(_PHASE_S * history.time.control_rate))
     return (first, end) if first < end else (0, 0)
 

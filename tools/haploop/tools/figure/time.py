@@ -109,7 +109,7 @@ def energy_panel(ax: Axes, run: RunData, books: list[Book], colours: dict[str, s
     """Draws the energy taken out of the device: true books drawn through, sampled ones dashed."""
     energies = np.concatenate([np.empty(0), *(curve for book in books for curve in (book.true_J, book.sampled_J))])
     factor, letter = prefix_for(np.abs(energies[np.isfinite(energies)]).max(initial=0.0, keepdims=True))
-    style.dress(ax, "Energy taken out of the device (given to it below 0)", "time (s)", f"energy ({letter}J)")
+    style.dress(ax, "Energy out of the device (below 0: into it)", "time (s)", f"energy ({letter}J)")
     for book in books:
         line(ax, book.t_s, book.true_J / factor, book.name, colours[book.name], linewidth=1.6, gid=f"{book.name}.true")
         look = {"linewidth": 1.0, "dashes": (4, 2), "gid": f"{book.name}.sampled"}

@@ -2,6 +2,7 @@
 
 import { amount, amounts, NONE } from "./amounts.js";
 import { make, put } from "./dom.js";
+import { frequency } from "./header.js";
 import { colour } from "./palette.js";
 
 const SIDES = ["before", "after"];
@@ -9,9 +10,9 @@ const TRACES = [["x", "position", "m"], ["force", "force", "N"]];
 const HEIGHT = 74;
 const FIGURES = [
   ["seen", ({ word }) => word],
-  ["swing", ({ oscillation_m: width }) => amount(width, "m")],
-  ["at", ({ frequency_Hz: hz }) => amount(hz, "Hz")],
-  ["force, peak to peak", ({ force_swing_N: swing }) => amount(swing, "N")],
+  ["swing p-p", ({ oscillation_m: width }) => amount(width, "m")],
+  ["at", frequency],
+  ["applied force p-p", ({ force_swing_N: swing }) => amount(swing, "N")],
   ["displayed stiffness", ({ stiffness_N_m: k }) => amount(k, "N/m")],
 ];
 

@@ -32,7 +32,7 @@ export function showHeader(state, phase) {
   showVerdict(state);
   const { sight } = state;
   put(byId("oscillation"), amount(sight?.oscillation_m, "m"));
-  put(byId("frequency"), sight?.oscillation_m || sight?.force_swing_N ? amount(sight.frequency_Hz, "Hz") : NONE);
+  put(byId("frequency"), sight ? frequency(sight) : NONE);
   put(byId("ripple"), amount(sight?.force_swing_N, "N"));
   put(byId("stiffness"), stiffness(state));
   put(byId("residual"), share(state));
@@ -42,6 +42,9 @@ export function showHeader(state, phase) {
   put(byId("skipped"), isNumber(state.skipped_ticks) ? `${state.skipped_ticks} ticks` : NONE);
   showTime(state);
 }
+
+/** At how many hertz it swings; of what has stopped in the last half second, none. */
+export const frequency = ({ oscillation_m: width, force_swing_N: force, frequency_Hz: hz }) => (width || force ? amount(hz, "Hz") : NONE);
 
 function showVerdict(state) {
   const { sight, verdict_is: is } = state;

@@ -11,6 +11,7 @@ const DOT_PX = 3;
 const NOW_PX = 7;
 const COARSE = "Of this time only the least and greatest of each interval are kept here, so no loop of it; the log has every sample.";
 const NONE_HERE = "No loop in this time.";
+const NO_CONTACT = "Not in contact in this time.";
 const NO_WALL = "No wall, so no loop of force and penetration.";
 const NO_INERTIA = "No virtual inertia at work, so no loop of momentum and velocity.";
 const LINES = {
@@ -34,7 +35,8 @@ export class PhasePlots {
   show({ tables: { loop, momentum }, coarse }, { wall, elements = [] }) {
     const why = coarse ? COARSE : NONE_HERE;
     const hasInertia = elements.some(({ kind }) => kind.includes("inertia"));
-    this.loop.show(loop ? forceLoop(loop) : [], loop ? "" : wall?.into_wall ? why : NO_WALL);
+    const parts = loop ? forceLoop(loop) : [];
+    this.loop.show(parts, loop ? (parts.length ? "" : NO_CONTACT) : wall?.into_wall ? why : NO_WALL);
     this.momentum.show(momentum ? momentumLoops(momentum) : [], momentum ? "" : hasInertia ? why : NO_INERTIA);
   }
 
@@ -48,7 +50,7 @@ export class PhasePlots {
   }
 }
 
-/** Pressing and releasing told apart, beside the wall it should be; what lies outside the wall is left out. */
+/** Pressing and releasing told apart, beside the wall it should be; what lies outside the wall is left out, an empty list where all does. */
 function forceLoop({ columns, stiffness, curve }) {
   const [depth, force] = columns.map(({ values }) => values);
   const x = new Float64Array(depth.length);
@@ -57,6 +59,7 @@ function forceLoop({ columns, stiffness, curve }) {
     x[i] = depth[i] > 0 || force[i] !== 0 ? depth[i] * MM : NaN;
     if (depth[i] > deepest) deepest = depth[i];
   }
+  if (!x.some((depth) => depth === depth)) return [];
   const presses = (i) => x[i + 1] > x[i];
   const parts = [
     { key: "pressing", label: "pressing", path: (u, xs, ys) => line(u, xs, ys, presses) },

@@ -35,7 +35,7 @@ export class RunChoice {
     if (known !== this.known) {
       this.known = known;
       this.words = new Map([...live, ...past, ...over].map((run) => [run.id, words(run)]));
-      byId("run").replaceChildren(group(`live (${live.length})`, live), group("recorded, in runs/", past), ...(over.length ? [group("on show", over)] : []));
+      byId("run").replaceChildren(none(), group(`live (${live.length})`, live), group("recorded, in runs/", past), ...(over.length ? [group("on show", over)] : []));
       byId("overlay").replaceChildren(make("option", { value: "" }, "no other run"), ...past.map(option));
       byId("runs").hidden = live.length + past.length === 0;
     }
@@ -83,3 +83,6 @@ const option = (run) => make("option", { value: run.id, title: words(run) }, wor
 const words = ({ id, title, told }, name = id) => [title === id ? name : `${name}: ${title}`, told].filter(Boolean).join(", ");
 
 const group = (label, runs) => make("optgroup", { label }, ...runs.map(option));
+
+/** Shown where no run is. */
+const none = () => make("option", { value: "", hidden: "" }, "none on show");

@@ -49,7 +49,8 @@ export class Scrubber {
     // As it was asked for: what is drawn comes a little later.
     if (!this.isHeld) this.input.value = String(Math.round((STEPS * ((end ?? last) - first)) / (last - first)));
     this.input.setAttribute("aria-valuetext", `${from.toFixed(2)} to ${Math.min(to, last).toFixed(2)} s`);
-    put(byId("scrub-ends"), `${first.toFixed(1)}–${last.toFixed(1)} s`);
+    const decimals = last - first < 1 ? 3 : 1;
+    put(byId("scrub-ends"), `${first.toFixed(decimals)}–${last.toFixed(decimals)} s`);
   }
 
   /** The band between the extremes of each stretch, which come in pairs: a swing too fast for the strip has no zigzags. */

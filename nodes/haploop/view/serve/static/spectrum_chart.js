@@ -21,8 +21,9 @@ export class SpectrumChart {
     this.charts = Object.entries(SIDES).map(([name, side]) => {
       const said = make("p", { class: "line-name" });
       const plot = make("div", { class: "plot" });
-      host.append(make("section", { class: "chart", "aria-label": `spectrum of the ${side.label}` }, said, plot));
-      return this.chart(name, side, plot, said);
+      const card = make("section", { class: "chart", "aria-label": `spectrum of the ${side.label}` }, said, plot);
+      host.append(card);
+      return { card, ...this.chart(name, side, plot, said) };
     });
     host.append(this.note);
     this.tell = seldom((...what) => this.words(...what));
@@ -58,6 +59,7 @@ export class SpectrumChart {
   show({ tables: { spectrum }, lines, coarse }) {
     for (const chart of this.charts) {
       const { name, side, unit, u } = chart;
+      chart.card.hidden = !spectrum; // axes without a line would tell numbers of nothing
       const column = spectrum?.columns.find((one) => one.name === name);
       const at = spectrum ? times(spectrum) : new Float64Array(0);
       if (unit.serve(Math.max(side.least, extent([column?.values ?? []])[1]))) {
@@ -74,7 +76,7 @@ export class SpectrumChart {
   }
 
   words(lines, coarse) {
-    for (const { name, side, said } of this.charts) put(said, lines ? `${side.label}: ${told(lines[name], side.unit)}` : side.label);
+    for (const { name, side, said } of this.charts) put(said, lines ? `${side.label}, ${told(lines[name], side.unit)}` : side.label);
     const missing = coarse ? "No spectrum: of this time only the least and greatest of each interval are kept here." : "Too few samples for a spectrum.";
     put(this.note, lines ? `Amplitudes, ${lines.from_s.toFixed(2)} to ${lines.to_s.toFixed(2)} s.` : missing);
   }
@@ -87,5 +89,5 @@ export class SpectrumChart {
 /** The main line in words. */
 function told(line, unit) {
   if (!line) return `no line stands out`;
-  return `main line ${amount(line.frequency_Hz, "Hz")}, ${amount(line.width, unit)} peak to peak of it alone`;
+  return `main line: ${amount(line.frequency_Hz, "Hz")}, ${amount(line.width, unit)} p-p`;
 }

@@ -45,9 +45,13 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
 const share = (own) => (own < 0.01 ? "less than 1 %" : `${Math.round(100 * own)} %`);
 
 function figures({ duration_s, ended, extremes = {}, window = {}, real_time_factor: factor, lost = {} }, wasPaused) {
+  const last = `last ${amount(duration_s - window.from_s, "s", 2)}`;
   return {
     ran: `${isNumber(duration_s) ? fixed(duration_s, 4) : NONE} s, ${HOW[ended] ?? ended}`,
     "position from": amounts(extremes.x_min_m, extremes.x_max_m, "m"),
+    // As the summary has them: the position with its trend, the force of the command; above the charts they are others.
+    ...(isNumber(window.oscillation_m) ? { [`oscillation, ${last}`]: `${amount(window.oscillation_m, "m")} p-p` } : {}),
+    ...(isNumber(window.force_swing_N) ? { "commanded force": `${amount(window.force_swing_N, "N")} p-p` } : {}),
     // That of the run itself: noise and the hand, which the pushed copies have not, are in it.
     ...(isNumber(window.force_ripple_N) ? { "its own ripple": `${amount(window.force_ripple_N, "N")} above 30 Hz` } : {}),
     "largest force": amount(extremes.force_max_N, "N"),
