@@ -53,6 +53,8 @@ ENERGY: Mapping[str, str] = {
     "velocity make, in place of the true ones",
     "energy.wall.leak.delay_J": "part of the leak that the delay of the line makes, jitter and loss among it",
     **_BESIDE,
+    "energy.stored_at_start_J": "kinetic energy of all bodies, and energy in the hand's spring, cable and "
+    "grip, at the start",
     "energy.stored_J": "kinetic energy of all bodies, and energy in the hand's spring, cable and grip, at the end",
     "energy.moved_J": "all energy that was stored at the start or changed its place since, the measure of the residual",
     "energy.residual_J": "what the books leave over, in magnitude: rounding, the error of an integrator, or what a "

@@ -93,6 +93,7 @@ def energy(books: BooksState, accounts: Sequence[Account], has_wall: bool) -> Su
         ],
         "wall": wall,
         **{f"{name}_J": total_J(books, name) for name in beside},
+        "stored_at_start_J": books.stored_at_start_J,
         "stored_J": stored_J(books),
         "moved_J": moved_J(books),
         "residual_J": residual_J(books),

@@ -144,7 +144,7 @@ def judge(
     swings of an unstable loop, but wide ones not: where somebody asks, what rests is pushed without it as well. A loop
     that rests at the last hold of a hand that moves is judged at its hardest hold, too.
     """
-    push_N = push_of(end.hold_N)
+    push_N = push_of(end.hold_N, end.scene)
     pushes_N = push_N * SMALLER, push_N
     found, x = _watched(end, pushes_N, looks_s)
     if found.word == "limit-cycle":

@@ -53,7 +53,7 @@ def judge_batch(end: BatchEnd, looks_s: Sequence[float] = LOOKS_S) -> list[Findi
 
 def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s: Sequence[float]) -> list[Finding]:
     """Judges members that touch the wall."""
-    push_N = np.array([push_of(hold) for hold in hold_N])
+    push_N = _pushes(end, members, hold_N)
     found, asked = _watched(end, members, hold_N, push_N, (SMALLER, 1.0), looks_s)
     for blow in BLOWS:
         if struck := [place for place, each in enumerate(found) if is_struck(each)]:
@@ -73,13 +73,17 @@ def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s:
     return _with_chaos(end, members, hold_N, push_N, found, asked)
 
 
+def _pushes(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray) -> np.ndarray:
+    return np.array([push_of(hold, end.scenes[i]) for i, hold in zip(members, hold_N.tolist(), strict=True)])
+
+
 def _without_friction(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, found: list[Finding]) -> list[Finding]:
     """Returns the findings; of each loop that rests, also whether it would without its friction."""
     rests = [place for place, each in enumerate(found) if is_struck(each)]
     if not rests or not end.scenes[0].friction:
         return found
     free = end._replace(scenes=[replace(scene, friction=Friction(kinetic=0.0)) for scene in end.scenes])
-    push_N = np.array([push_of(hold) for hold in hold_N[rests]])
+    push_N = _pushes(end, members[rests], hold_N[rests])
     alike, _ = _watched(free, members[rests], hold_N[rests], push_N, (SMALLER, 1.0), LOOKS_S)
     told = dict(zip(rests, alike, strict=True))
     return [each.without_friction(told[place]) if place in told else each for place, each in enumerate(found)]

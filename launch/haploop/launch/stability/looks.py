@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from haploop.launch.stability.decide import HAND_MOVES, NOISE, Finding, decide
+from haploop.launch.stability.still_hand import LEAST_PRESS_N, press_of
 from haploop.launch.stability.swing import Pushed, measure
 from haploop.protocol.scene.hand_force import constant_from_s
 from haploop.protocol.scene.scene import Scene
@@ -20,7 +21,6 @@ BLOWS = (10.0, -10.0)
 # Times since the push at which the loop is looked at, in s: of a run as part of it, and where somebody asks.
 LOOKS_S = (1.0, 2.0, 4.0, 8.0, 16.0)
 PATIENT_S = (*LOOKS_S, 32.0, 64.0)
-_LEAST_LOAD_N = 1e-3
 # A loop is watched for so many ticks at least.
 _LEAST_TICKS = 240
 # A third copy, pushed harder by this share, shows whether the swing is chaotic: whether it ends apart from the second
@@ -47,8 +47,10 @@ def parts(one: np.ndarray, other: np.ndarray, width_m: float) -> bool:
     return bool(apart[:eighth].min() < 0.01 * width_m and apart[-2 * eighth :].max() > _APART * width_m)
 
 
-def push_of(hold_N: float) -> float:
-    return PUSH * max(abs(hold_N), _LEAST_LOAD_N) * (1.0 if hold_N > 0.0 else -1.0)
+def push_of(hold_N: float, scene: Scene) -> float:
+    """Returns the larger push of a loop whose hand is held at a force, N."""
+    press_N = press_of(hold_N, scene)
+    return PUSH * max(abs(press_N), LEAST_PRESS_N) * (1.0 if press_N > 0.0 else -1.0)
 
 
 def is_struck(found: Finding) -> bool:

@@ -22,6 +22,8 @@ PUSH_S = 0.05
 _HOLD_S, _LATEST_S = 0.25, 60.0
 # A hold that is harder by less than this is the same.
 _HARDER = 1.2
+# A hand that presses by less holds nothing.
+LEAST_PRESS_N = 1e-3
 
 
 @dataclass(frozen=True)
@@ -133,6 +135,14 @@ def hold_of(scene: Scene, time: Timebase, last: int, inside: np.ndarray) -> floa
     return float(force.at_steps((last - len(inside)) * n, last * n)[::n][inside].mean())
 
 
+def press_of(hold_N: float, scene: Scene) -> float:
+    """Returns by how much a hand held at a force presses, N: with its spring at the wall, where that presses more."""
+    if not (scene.hand and scene.wall):
+        return hold_N
+    with_spring_N = hold_N + scene.hand.stiffness * (scene.hand.rest - scene.wall.position)
+    return max(hold_N, with_spring_N, key=abs)
+
+
 def harder_hold(scene: Scene, time: Timebase, last: int, hold_N: float) -> float | None:
     """Returns the hardest hold in N of a hand that moves, before tick ``last``; None where ``hold_N`` is about that.
 
@@ -146,5 +156,8 @@ def harder_hold(scene: Scene, time: Timebase, last: int, hold_N: float) -> float
     force = HandForce(table, time.plant_rate).at_steps(first * n, last * n)[::n]
     sums = np.cumsum(np.concatenate([[0.0], force]))
     means = (sums[ticks:] - sums[:-ticks]) / ticks
-    hardest = float(means[np.argmax(means * np.sign(hold_N))]) if len(means) else hold_N
-    return hardest if abs(hardest) > _HARDER * abs(hold_N) and hardest * hold_N > 0.0 else None
+    press_N = press_of(hold_N, scene)
+    hardest = float(means[np.argmax(means * np.sign(press_N))]) if len(means) else hold_N
+    most_N = press_of(hardest, scene)
+    is_harder = abs(most_N) > max(_HARDER * abs(press_N), LEAST_PRESS_N) and most_N * press_N > 0.0
+    return hardest if is_harder else None

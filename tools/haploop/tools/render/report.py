@@ -183,6 +183,7 @@ def _books(energy: Summary, control_rate: float) -> Table:
     residual, moved = energy["residual_J"], energy["moved_J"]
     share = f", {residual / moved:.1e} of what moved" if residual is not None and moved else ""
     rows = {words: energy[key] for key, words in plant_books(energy).items()}
+    rows |= {"stored at the start": energy["stored_at_start_J"]} if "stored_at_start_J" in energy else {}
     rows |= {"stored at the end": energy["stored_J"], "moved in total": moved}
     rows |= {} if "unmodelled_work_J" in energy else {f"residual{share}": residual}
     for name, value in rows.items():

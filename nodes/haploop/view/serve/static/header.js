@@ -69,7 +69,7 @@ function moved({ verdict, sight }) {
   if (rests && (word === "moving" || SWINGS.has(word))) return "";
   if (word === "force ripples") return `force still ripples by ${amount(ripple, "N")}`;
   if (word === "moving") return `still moves by ${amount(width, "m")}`;
-  if (SWINGS.has(word)) return `still swings by ${amount(width, "m")}${word === "swinging" ? "" : `, ${word}`}`;
+  if (SWINGS.has(word)) return `still swings by ${amount(width, "m")}${word === "swinging" || sight.so_far ? "" : `, ${word}`}`;
   return word in SIGNS ? `last seen: ${word}` : "";
 }
 
