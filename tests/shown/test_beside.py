@@ -228,6 +228,14 @@ def test_beside_a_verdict_its_provisos_are_told_in_full_in_overlay_and_table(run
     assert len(row(table, "trajectory hash")[0]) == 16
 
 
+def test_of_a_run_that_was_not_pushed_no_swing_after_a_push_is_told(runs):
+    held, other = data(runs, "a", "swapped")
+    untouched = replace(other, summary=other.summary | {"stability": {"push_N": 0.0, "width_m": 0.0}})
+    pushed = replace(held, summary=held.summary | {"stability": {"push_N": 0.3, "width_m": 2e-3}})
+    table = shown(difference_table(difference(pushed, untouched)), 140)
+    assert row(table, "pushed, it swings by") == ["2.00 mm", "–"]
+
+
 def test_plot_of_several_runs_writes_one_figure_and_refuses_what_it_cannot_draw(runs, tmp_path):
     done = haploop("plot", runs["a"], runs["again"], "--out", tmp_path / "both.png")
     assert done.exit_code == 0
