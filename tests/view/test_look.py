@@ -88,6 +88,14 @@ def test_a_swing_that_has_no_word_yet_is_told_from_what_rests():
     assert seen(deep, lambda t: 0.1 + 0.05 * np.sin(300 * t), since=2850).so_far_word == "force ripples"
 
 
+@pytest.mark.parametrize("f", [2.3, 7.99, 30.2])
+def test_the_width_of_a_steady_swing_is_that_of_the_swing_wherever_the_window_cuts_it_off(f):
+    """Its straight trend by itself makes it up to a quarter wider."""
+    assert seen(sine(f, 1e-3), end=2813).oscillation_m == pytest.approx(2e-3, rel=1e-3)
+    drifts = seen(lambda t: sine(30.2, 1e-3)(t) + 4e-3 * t)
+    assert drifts.oscillation_m == pytest.approx(2e-3, rel=0.08)
+
+
 def test_what_bounces_on_and_off_the_wall_is_one_regime():
     assert seen(lambda t: 2e-3 * np.sin(2 * np.pi * 8.0 * t)).word == "swinging"
 

@@ -48,7 +48,8 @@ class Sight:
         so_far_word: what the word would be if the interval were a whole window; "" where nothing can be told.
         from_s, to_s: the interval that the word is about; numbers are of its newest window.
         so_far: whether the interval is shorter than a window, so that no word is told yet.
-        oscillation_m, ripple_N: widths of position and of applied force about their straight trends, peak to peak.
+        oscillation_m, ripple_N: widths of position and of applied force about their straight trends, peak to peak; that
+            of the position as it is, where the trend of a swing that is cut off makes it no narrower.
         force_swing_N: the applied force as it is, peak to peak.
         rests: whether the position swung by no more than what counts in the newest window.
         frequency_Hz: of the line of the position where one stands out, else of that of the force; None for none.
@@ -133,8 +134,9 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
         window=WINDOW_S, begin=by, seen=seen_s, crossings=crossings, growth=growth, swing_um=swing_m * 1e6,
         width_um=width * 1e6, ripple_N=ripple, most_N=max(ripples)[0],
     )  # fmt: skip
+    swing_now_m = float(min(np.ptp(newest[0]), np.ptp(_flat(newest[0]))))
     return Sight(
-        word, why, long_first / rate, end / rate, so_far, float(np.ptp(_flat(newest[0]))), ripple,
+        word, why, long_first / rate, end / rate, so_far, swing_now_m, ripple,
         line.frequency_Hz if line else None, stiffness if inside[first - end :].any() else None,
         float(np.ptp(newest[1])), so_far_word, rests,
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -51,7 +52,7 @@ def widest_m(line: Line, along: Widths, begins: bool = False, ends: bool = False
     return max(line.width, float(along.width_m[places].max())) if along.varies(places) else line.width
 
 
-def along_m(told: list[Window], ends: dict[float, End]) -> tuple[Floats, float]:
+def along_m(told: list[Window], ends: Mapping[float, End]) -> tuple[Floats, float]:
     """Returns the widths of what the swing fills in the order of time, and their standard error, m.
 
     Each window tells of its middle quarter; the first of a part of what is before, too, and the last of what comes
