@@ -97,7 +97,15 @@ def test_the_summary_has_a_heat_for_every_damper_and_friction_and_what_the_actua
     assert all(energy[name] > 0.0 for name in heats)
     assert energy["actuator_J"] != 0.0
     assert energy["residual_J"] < 1e-12 * energy["moved_J"]
-    plain_keys = ["hand_work_J", "device_heat_J", "hand_heat_J", "stored_J", "moved_J", "residual_J"]
+    plain_keys = [
+        "hand_work_J",
+        "device_heat_J",
+        "hand_heat_J",
+        "stored_at_start_J",
+        "stored_J",
+        "moved_J",
+        "residual_J",
+    ]
     assert [name for name in plain[1]["energy"] if name not in ("elements", "wall")] == plain_keys
 
 
