@@ -264,6 +264,21 @@ def test_on_a_phone_what_steers_is_in_sight_wherever_one_reads_and_the_swap_one_
     assert "token" in page.url
 
 
+@pytest.mark.slow
+def test_on_a_phone_the_numbers_of_a_swing_stand_in_one_row(stand_in, open_page):
+    page = shown(stand_in, open_page, PHONE, "dark")
+    stand_in.state(
+        tick=118_887, end_tick=600_000, sight=RUNNING["sight"] | {"frequency_Hz": 30.2, "force_swing_N": 3.56}
+    )
+    expect(page.locator("#time")).to_have_text("118.887 of 600 s")
+    heights = (
+        """() => [...document.querySelectorAll(".figures div")].filter(e => e.offsetParent).map(e => e.offsetTop)"""
+    )
+    assert len(set(page.evaluate(heights))) == 1
+    page.evaluate("document.querySelector('.figures .spare').style.display = 'inline'")
+    assert len(set(page.evaluate(heights))) == 2, "of the desk's name they would not"
+
+
 # Every picture is drawn as if the page waited for a run, when charts have two columns, and shown as it was before.
 DRAWN_IN_ANOTHER_LAYOUT = """() => {
     const ask = requestAnimationFrame;
