@@ -131,7 +131,6 @@ def state(session: RunSession) -> Message:
         "nodes": [] if session.outcome else status.get("nodes", []),
         "skipped_ticks": session.skipped_ticks,
         "first_s": (history.first_tick or 0) / time.control_rate,
-        "options": None if session.outcome else session.clock.options,
         "elements": [{"kind": one.name, "parameters": {**one.parameters, "acts": one.acts}} for one in elements],
         "own": bool(history.own),
         "wall": wall
@@ -151,7 +150,8 @@ def state(session: RunSession) -> Message:
     judged = (summary, summary["window"], summary["energy"]) if summary else (session.status,) * 3
     for entry, names in zip(judged, _JUDGED, strict=True):
         message |= {name: entry.get(name) for name in names}
-    return finite(message)
+    # Options are much the largest part, and fit for JSON since they came.
+    return {**finite(message), "options": None if session.outcome else session.clock.options}
 
 
 class EventLine(TypedDict):

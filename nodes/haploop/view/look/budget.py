@@ -41,7 +41,7 @@ def budget(history: History, from_tick: int, end: int) -> dict[str, Any] | None:
     rows = [
         {"name": label, "total_J": sum(sign * total[name] for sign, name in parts),
          "window_J": sum(sign * window[name] for sign, name in parts)}
-        for label, parts in _causes(names, _LABELS | book_names(history))
+        for label, parts in _causes(names, {**_LABELS, **book_names(history)})
     ]  # fmt: skip
     shown = [row for row in rows if np.isfinite(row["total_J"]) and np.isfinite(row["window_J"])]
     return {"from_s": first / rate, "to_s": (end - 1) / rate, "about_s": about / rate, "rows": shown}

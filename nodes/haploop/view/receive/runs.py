@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
+from haploop.logger.summary import finite
 from haploop.protocol.changes import Event, at_work, changes_of
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.transport.sockets import SecureContext
@@ -92,7 +93,7 @@ class ClockAnswers:
 
     Attributes:
         status: the answer to ``status``, {} before the first.
-        options: what can be changed; None before the first answer.
+        options: what can be changed, fit for JSON; None before the first answer.
         limit: the largest stiffness that its wall may have in the loop as it is, N/m, or why none is known.
     """
 
@@ -114,7 +115,7 @@ class ClockAnswers:
             with contextlib.suppress(CommandFailed):  # it is about to end
                 _, self.status = await self._ask("status", {})
                 if changes != seen:
-                    _, self.options = await self._ask("options", {})
+                    self.options = finite((await self._ask("options", {}))[1])
                     seen = changes
                     now = at_work(self._scene, changes_of(self._events))
                     self.limit = await asyncio.to_thread(self._runs.stiffness_limit, now)
