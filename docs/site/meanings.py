@@ -1,4 +1,4 @@
-"""What the columns of a log and the entries of a summary mean, as the code that declares them says it."""
+"""Meanings of the columns of a log and the entries of a summary, as the code that declares them says them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a document tells its reader to type and to write, block by block in its order."""
+"""Commands and files that a document tells its reader to type and to write, block by block in its order."""
 
 from __future__ import annotations
 

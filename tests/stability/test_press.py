@@ -1,4 +1,4 @@
-"""How hard a loop is pushed: by a share of what its hand presses the wall with, its spring counted."""
+"""Size of the push of a loop: a share of what its hand presses the wall with, its spring counted."""
 
 from __future__ import annotations
 

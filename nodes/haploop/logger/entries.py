@@ -1,4 +1,4 @@
-"""What every entry of ``summary.json`` means that the logger writes by itself, by dotted key.
+"""Meanings of the entries of ``summary.json`` that the logger writes by itself, by dotted key.
 
 N stands for a place in a list, NAME for a name that the scene or the machine gives. What has a type of its own,
 such as ``window``, says it there.

@@ -1,4 +1,4 @@
-"""What every book means, where log, summary and their reference call it by its name."""
+"""Meaning of every book, where log, summary and their reference call it by its name."""
 
 from __future__ import annotations
 
