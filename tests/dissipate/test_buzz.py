@@ -60,7 +60,7 @@ def drawn(seed: int, before: bool, after: bool) -> tuple[float, BuzzFinder]:
     ("before", "after", "most"),
     [
         (False, False, 1e-9),
-        (True, True, 0.08),
+        pytest.param(True, True, 0.08, marks=pytest.mark.slow),
         pytest.param(True, False, 0.07, marks=pytest.mark.slow),
         pytest.param(False, True, 0.07, marks=pytest.mark.slow),
     ],
