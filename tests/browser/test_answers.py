@@ -43,7 +43,7 @@ def test_a_run_that_is_over_offers_nothing_live_and_says_whether_the_next_one_co
     expect(page.locator("#freeze")).to_have_text("Go live")
     stand_in.state(**ENDED)
     expect(page.locator("#freeze")).to_have_text("To its end")
-    expect(page.locator("#notice")).to_have_text("The run has ended. The next one will come up here by itself.")
+    expect(page.locator("#notice")).to_have_text("The run has ended. A run that is started now will come up here.")
     stand_in.tell(RUNS | {"stays": True})
     expect(page.locator("#notice")).to_have_text("The run has ended.")
 
@@ -136,17 +136,19 @@ def test_the_force_that_ripples_in_the_run_and_that_of_its_pushed_copies_are_tol
 
 
 @pytest.mark.slow
-def test_the_header_has_the_numbers_with_their_units(stand_in, open_page):
+def test_the_header_has_the_numbers_with_their_units_and_no_stiffness_of_what_swings(stand_in, open_page):
     stand_in.state()
     page = open_page(stand_in.url)
     expect(page.locator("#oscillation")).to_have_text("5.35 mm")
     expect(page.locator("#frequency")).to_have_text("8.25 Hz")
     expect(page.locator("#ripple")).to_have_text("410 mN")
-    expect(page.locator("#stiffness")).to_have_text("137 of 150 N/m")
+    expect(page.locator("#stiffness")).to_have_text("–")
     expect(page.locator("#residual")).to_have_text("3.4e−16")
     expect(page.locator("#factor")).to_have_text("0.980×")
     expect(page.locator("#skipped")).to_have_text("12 ticks")
     expect(page.locator("#time")).to_have_text("1.500 of 3 s")
+    stand_in.state(sight=RUNNING["sight"] | {"word": "no swing seen"})
+    expect(page.locator("#stiffness")).to_have_text("137 of 150 N/m")
     stand_in.state(displayed_stiffness_N_m=None, sight=None, real_time_factor=None, pace="free")
     expect(page.locator("#stiffness")).to_have_text("–")
     expect(page.locator("#oscillation")).to_have_text("–")

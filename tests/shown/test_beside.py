@@ -230,7 +230,7 @@ def test_beside_a_verdict_its_provisos_are_told_in_full_in_overlay_and_table(run
 
 def test_of_a_run_that_was_not_pushed_no_swing_after_a_push_is_told(runs):
     held, other = data(runs, "a", "swapped")
-    untouched = replace(other, summary=other.summary | {"stability": {"push_N": 0.0, "width_m": 0.0}})
+    untouched = replace(other, summary=other.summary | {"stability": {"push_N": None, "width_m": None}})
     pushed = replace(held, summary=held.summary | {"stability": {"push_N": 0.3, "width_m": 2e-3}})
     table = shown(difference_table(difference(pushed, untouched)), 140)
     assert row(table, "pushed, it swings by") == ["2.00 mm", "–"]

@@ -53,6 +53,9 @@ def test_the_terminal_says_the_word_first_and_then_why(run):
 def test_a_run_out_of_contact_is_called_so(run):
     directory = run("launch/scenes/fig6a.toml", "--set", "wall.position=-0.5")
     assert json.loads(haploop("judge", str(directory), "--json").stdout)["word"] == "no-contact"
+    stability = json.loads((directory / "summary.json").read_text())["stability"]
+    of_a_push = ("push_N", "watched_s", "frequency_Hz", "width_m", "spread_m", "force_ripple_N")
+    assert [stability[name] for name in of_a_push] == [None] * 6, "it was not pushed"
 
 
 def test_a_run_that_diverged_is_called_so(run):

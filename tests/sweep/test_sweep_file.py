@@ -262,6 +262,18 @@ def test_a_file_that_is_no_sweep_is_said_to_be_none(text: str, tmp_path: Path) -
     assert all(mistake.file == str(path) for mistake in caught.value.mistakes)
 
 
+def test_a_scene_given_as_a_sweep_is_said_to_be_one_and_a_sweep_without_its_axes_is_not(tmp_path: Path) -> None:
+    path = tmp_path / "press.toml"
+    path.write_text(PRESS)
+    with pytest.raises(SceneError) as caught:
+        load(path)
+    [mistake] = caught.value.mistakes
+    assert mistake.expected.startswith("This is a scene, for haploop run.")
+    assert 'scene = "press.toml"' in mistake.expected
+    path.write_text(f'scene = "press.toml"\n{PRESS}')
+    assert "axes" in mistakes(path)
+
+
 def test_what_is_recorded_may_come_from_any_corner_of_the_grid(tmp_path: Path) -> None:
     text = 'record = ["energy.elements.0.true_J", "energy.wall.leak.delay_J"]\n'
     text += '[axes]\n"dissipation" = [[], [{ kind = "damping", damping = 1 }]]\n'

@@ -53,17 +53,20 @@ BESIDE = {
     "moved_beside": "what else moved the run at its end: the hand's motion, noise",
     "provisos": "what the verdict rests on, to be said in the same breath",
 }
+# Numbers that only a push gives.
+_OF_PUSH = ("push_N", "watched_s", "frequency_Hz", "width_m", "spread_m", "force_ripple_N")
 _DOES = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on", "diverged": "swings on"}
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found of a loop whose hand is held still.
+    """What was found of a loop whose hand is held still; a summary tells None for the sizes of what was not pushed.
 
     Attributes:
         word: steady, limit-cycle, growing, diverged, no-contact or undecided.
         why: what was found, in short, such as ``rest`` or ``forgets``: a key of ``why.WHY``.
-        push_N: the larger of the two pushes, in magnitude.
+        push_N: the larger of the two pushes, in magnitude; 0 of a run that diverged or ended out of contact, and was
+            not pushed.
         watched_s: time looked at, since the push.
         rate_1_s: the r of e^(r t) by which the steadier of the two swings grows; negative: it decays; None where it
             died within a few pieces.
@@ -146,6 +149,8 @@ class Finding:
             ripple_N: what its command swung by above 30 Hz there, peak to peak.
         """
         numbers = {name: value for name, value in vars(self).items() if name not in ("word", "detail")}
+        if not self.push_N:
+            numbers |= dict.fromkeys(_OF_PUSH)
         # A swing that nothing else moves is the loop's own, and differs from the one after a push by chance alone.
         is_told = beside or self.word == "steady"
         told = self.own_share(seen_m) if is_told else None, [*beside], self._provisos(seen_m, beside, ripple_N)

@@ -20,7 +20,8 @@ _MOST_EVENTS = 1000
 WAITING = {"type": "state", "phase": "waiting", "why": "", "run": None, "options": None, "summary": None, "nodes": []}
 # What the page says where a run has ended without a verdict.
 _NO_VERDICT = {
-    "awaited": "It is gone through again, held still and pushed at its end, for its verdict.",
+    "awaited": "It is gone through again, held still and pushed at its end, for its verdict. That "
+    "takes some seconds, longer for a device with a cable, a grip or friction.",
     "abandoned": "Its launcher has ended without judging it: haploop judge does.",
     "unjudged": "It was too long to be judged by itself: haploop judge does.",
     "foreign": "Not all of it was haploop's own, so that nothing can hold it still and push it: this is what was seen.",

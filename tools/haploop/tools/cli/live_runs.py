@@ -40,7 +40,8 @@ class RecordedRun:
         name, when = file.parent.name, time.strftime("%d %b %H:%M", time.localtime(ended_s))
         try:
             summary = read(file)
-            words = [told(summary), *summary.get("stability", {}).get("provisos", ()), when]
+            word = "failed" if summary["ended"] == "failed" else told(summary)
+            words = [word, *summary.get("stability", {}).get("provisos", ()), when]
             return cls(name, file.parent, summary.get("title") or name, ", ".join(words))
         except (LogError, KeyError):
             return cls(name, file.parent, name, when)

@@ -55,7 +55,7 @@ _HARMS, _NOT = (
     "so adaptive inertia does not help, as far as can be told",
 )
 _HEADS = {
-    "element": "element", "parameter": "parameter", "wall": "wall, N/mm", "held": "held, N/mm",
+    "element": "element", "parameter": "parameter", "wall": "wall set, N/mm", "held": "wall held, N/mm",
     "more": "more than none, N/mm", "contact": "contact, N/mm", "ripple": "ripple", "extra": "extra", "±20 %": "±20 %",
     "device ±20 %": "device ±20 %", "breaks first": "breaks first",
 }  # fmt: skip

@@ -21,15 +21,15 @@ from haploop.tools.render.units import amount, fixed
 from haploop.tools.search.intervals import mean_interval
 
 READING = (
-    "Wall: the stiffest that is safe in all conditions of a seed, as are all softer ones tried, mean over the seeds. "
-    "Held: mean force over mean measured penetration of that wall. More than none: held, less what is held without any "
-    "element under the same seed, mean and 95 % interval over the seeds. Contact: slope of the force on the first way "
-    "in. Ripple: of the command above 30 Hz, peak to peak. Extra: the element's own force, largest and root mean "
-    "square. ±20 %: what is held with all parameters, or the device, 20 % less and 20 % more, over that without. "
-    "Breaks first: the softest wall that failed under any seed. * a parameter at the end of its search, whose smallest "
-    "is about none; † no wall was too stiff: with others more may be held. ▲ ▼ told to hold more, or less, than none: "
-    "by three standard errors, the same way under two sets of seeds, each with its own tuning. Bold: not told from the "
-    "best by the same rule."
+    "Wall set: the stiffest that is safe in all conditions of a seed, as are all softer ones tried, mean over the "
+    "seeds. Wall held: mean force over mean measured penetration of that wall. More than none: held, less what is "
+    "held without any element under the same seed, mean and 95 % interval over the seeds. Contact: slope of the force"
+    " on the first way in. Ripple: of the command above 30 Hz, peak to peak. Extra: the element's own force, largest "
+    "and root mean square. ±20 %: what is held with all parameters, or the device, 20 % less and 20 % more, over that"
+    " without. Breaks first: the softest wall that failed under any seed. * a parameter at the end of its search, "
+    "whose smallest is about none; † no wall was too stiff: with others more may be held. ▲ ▼ told to hold more, or "
+    "less, than none: by three standard errors, the same way under two sets of seeds, each with its own tuning. Bold:"
+    " not told from the best by the same rule."
 )
 SIGNS = {"more": " ▲", "less": " ▼", "alike": ""}
 _TIED = "{0} renders most, {1}; it cannot be told apart from {2}."
@@ -42,7 +42,7 @@ def report(told: Comparison) -> RenderableType:
     """Makes the report, 80 columns wide."""
     first = told.loops[0]
     parts: list[RenderableType] = [
-        Text(f"All stabilizers on {told.name}, each tuned alike.", style="bold"),
+        Text(f"All stabilizers on {told.name}, each tuned alike: for comparing, not for building.", style="bold"),
         make_facts([("most", most_sentence(first)), ("again", again_sentence(first))], least_width=7),
         Text(),
         *(Text(note, style="dim") for note in told.notes),
@@ -61,7 +61,7 @@ def task_sentence(told: Comparison) -> str:
         f"sets of parameters are tried by {effort.first} seeds, the best {effort.finalists} and {effort.around} about "
         f"them by {effort.tuning}, the best {effort.finalists} and the smallest by {effort.last}; of what then holds "
         f"as much within a standard error the one that adds the least force is tried by {effort.seeds}, each "
-        "time others. The walls are for comparing, not for building: `haploop advise` tries one in some thousand cases."
+        "time others. A wall to build with is one that `haploop advise` has tried, in some thousand cases."
     )
 
 
@@ -137,7 +137,7 @@ def _table(of: OfLoop, heads: dict[str, str], numbers: Sequence[str], padding: i
 
 
 def _rendered(of: OfLoop) -> Table:
-    heads = {"element": "element", "parameter": "parameter", "wall": "wall\nN/mm", "held": "held\nN/mm",
+    heads = {"element": "element", "parameter": "parameter", "wall": "wall set\nN/mm", "held": "wall held\nN/mm",
              "more": "more than none\nN/mm", "contact": "contact\nN/mm"}  # fmt: skip
     return _table(of, heads, ("wall", "held", "contact"), 0)
 

@@ -112,7 +112,7 @@ def _results(run: RunData) -> dict[str, Any]:
         "oscillation_m": summary["window"]["oscillation_m"],
         "force_swing_N": summary["window"].get("force_swing_N"),
         "force_ripple_N": summary["window"].get("force_ripple_N"),
-        "width_m": found["width_m"] if found.get("push_N") else None,  # one that was not pushed has 0 there
+        "width_m": found.get("width_m"),
         "frequency_Hz": found.get("frequency_Hz") or None,
         "trajectory_sha256": summary.get("trajectory_sha256"),
     }

@@ -17,7 +17,7 @@ from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.bundled import found
 from haploop.launch.scene.check import complain
 from haploop.launch.scene.layers import KeyPath, Layers, key_path, lay_overrides, read_layers
-from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError, shown
+from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, shown
 from haploop.launch.scene.models import Model
 from haploop.launch.scene.number import Number, si
 from haploop.launch.scene.reading.lines import line_in
@@ -36,6 +36,10 @@ from haploop.tools.sweep.record import make_columns, usual
 from haploop.tools.sweep.table import Column
 
 MOST_AXES = 3
+_SCENE = (
+    "This is a scene, for haploop run. A sweep is a file of its own that names a scene and what is varied in it: "
+    'scene = "{0}", then [axes], then a line such as "wall.stiffness" = [500, 1000, 2000].'
+)
 _KINDS_UNLESS_GIVEN = {"wall": "spring"}
 Verdict = Literal["steady", "limit-cycle", "diverged", "no-contact", "no-swing-seen", "swinging"]
 
@@ -85,6 +89,8 @@ class _Reader:
         self._layers = Layers(path)
         self._layers.lay(parse(path, "sweep", "a scene and [axes]"), str(path))
         self._data = self._layers.data
+        if not {"axes", "scene", "base"} & self._data.keys() and {"extends", "device", "wall"} & self._data.keys():
+            raise SceneError([Mistake(shown(path), "", "", _SCENE.format(path.name))])
         given = self._data.get("set")
         self._changes: Values = given if isinstance(given, dict) else {}
         # By the key of each axis what reads its values, where they are numbers.

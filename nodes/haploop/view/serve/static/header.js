@@ -10,7 +10,8 @@ const SIGNS = {
   swinging: "limit-cycle", growing: "growing", "force ripples": "limit-cycle", "no contact": "no-contact",
   "not finite": "diverged",
 };
-const SWINGS = new Set(["swinging", "growing", "dying away"]);
+/** Words of what swings. */
+export const SWINGS = new Set(["swinging", "growing", "dying away"]);
 const NOT_YET = { awaited: "being judged", unknown: "not known" };
 
 /** What there is of a verdict, in a word. */
@@ -80,7 +81,8 @@ function seen(sight) {
   return soFar ? `so far: ${steady(to - from, 2)} of 0.5 s` : `in ${steady(from, 2)}–${steady(to, 2)} s`;
 }
 
-function stiffness({ displayed_stiffness_N_m: displayed, wall }) {
+function stiffness({ displayed_stiffness_N_m: displayed, wall, sight }) {
+  if (SWINGS.has(sight?.word)) return NONE; // force over depth of a swing is none
   const isSpring = isNumber(displayed) && wall?.into_wall && !wall.kind;
   return isSpring ? amountOf(displayed, wall.stiffness, "N/m") : amount(displayed, "N/m");
 }
@@ -93,7 +95,7 @@ function factor({ real_time_factor: now, pace, summary, was_paused: paused, late
   if (late?.clock === "plant" && late.ticks) return `${fixed((100 * late.late_ticks) / late.ticks, 2)} % late`;
   const real = summary?.real_time_factor ?? now;
   if (!isNumber(real)) return NONE;
-  if (summary && paused) return `${fixed(real)}×, paused`; // the pauses are in it
+  if (summary && paused) return `${fixed(real)}×, with pauses`;
   return isNumber(pace) && pace !== 1 && !summary ? `${Math.round((100 * real) / pace)} % of ${plain(pace)}×` : `${fixed(real)}×`;
 }
 
