@@ -18,7 +18,7 @@ from haploop.tools.sweep.table import read as read_table
 from helpers.documented import LIVE, Block, blocks, commands
 from helpers.live.launched import HAPLOOP, PATIENCE_S, wait_for
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 HOUSE = Path(__file__).parents[1]
 TUTORIALS = HOUSE / "docs/tutorials"

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -95,6 +96,8 @@ def test_an_advice_says_first_that_it_is_an_upper_bound_goes_on_when_stopped_and
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout.splitlines()[-1])
     assert found["headline"].startswith("Upper bound, not advice: premium15 is taken as rigid")
+    wall = f"at most {found['recommended']['stiffness_N_m'] / 1e3:.3g} N/mm | nothing"
+    assert f"| `premium15` | {wall} |" in Path("docs/advise.md").read_text(encoding="utf-8")
     assert "for a hand: of 0.269 kg, 6.43 N s/m and 105 N/m, holding through a grip of " in found["advice"]
     assert "loses most: no friction: 0." in found["advice"]
     told = api.advise("premium15", workers=1, out=out)

@@ -69,7 +69,7 @@ def test_a_buzz_lasts_as_long_as_it_does_and_to_the_very_end_of_a_short_recordin
     before: bool, after: bool, most: float
 ) -> None:
     errors = []
-    for seed in range(40):
+    for seed in range(24):
         lasts_s, found = drawn(seed, before, after)
         buzz = found.buzz()
         assert buzz is not None
@@ -227,7 +227,7 @@ def test_a_swing_left_out_near_a_multiple_of_a_slower_one_is_told_beside_that_no
 
 @pytest.mark.parametrize("period_s", [5e-3, 1e-3, pytest.param(1e-4, marks=pytest.mark.slow)])
 def test_noise_is_no_buzz(period_s: float) -> None:
-    for seed in range(8):
+    for seed in range(4):
         random, count = np.random.default_rng(seed), round(4.0 / period_s)
         white = np.asarray(COUNT_M * random.standard_normal(count), float)
         for x in (white, np.cumsum(white), counted(white), counted(COUNT_M * random.random(count))):

@@ -27,7 +27,7 @@ def test_a_swing_from_1_5_to_4_hz_is_told_right_or_not_at_all(
     t = np.arange(0.0, seconds, 1e-3)
     beside = drift * (5e-3 * t + 2e-3 * np.sin(2.0 * np.pi * 0.23 * t))
     told = []
-    for frequency_Hz in np.arange(1.5, 4.01, 0.05):
+    for frequency_Hz in np.arange(1.5, 4.01, 0.1):
         noise = noise_m * np.random.default_rng(3).standard_normal(len(t))
         found = finder(t, 0.5 * WIDE_M * np.sin(2.0 * np.pi * frequency_Hz * t + phase) + beside + noise)
         assert found.slower
@@ -39,7 +39,7 @@ def test_a_swing_from_1_5_to_4_hz_is_told_right_or_not_at_all(
             assert found.slow.frequency_Hz == pytest.approx(frequency_Hz, abs=0.25 / seconds + 0.02 * frequency_Hz)
             assert found.slow.width == pytest.approx(WIDE_M, rel=0.1)
     assert told[0] < 3.0
-    assert len(told) > 20
+    assert len(told) > 10
 
 
 def test_a_swing_of_3_hz_is_as_wide_as_it_is() -> None:

@@ -30,7 +30,7 @@ def test_a_run_waits_for_an_external_controller_and_gives_the_same_bits(started:
     own, run = started(node=None), started("--external", "controller", node=None)
     seat = seat_of(run)
     assert stat.S_IMODE(seat.stat().st_mode) == 0o600
-    assert "Waiting 60 s for a controller to join" in run.stderr
+    run.says("Waiting 60 s for a controller to join")
     controller = joined(seat, "--nameless")
     assert run.summary()["trajectory_sha256"] == own.summary()["trajectory_sha256"]
     assert run.summary()["programs"]["controller"] == {"name": "", "version": "", "command": "", "own": False}

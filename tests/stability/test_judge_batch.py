@@ -30,7 +30,7 @@ def trembling() -> list[Scene]:
     """Hands that tremble, each at its force, at noisy walls of every kind."""
     sine = Sine(amplitude=0.1, frequency=4.0, offset=-0.65)
     noise = Noise(deviation=1e-6, cutoff=200.0)
-    scenes = shipped("fig6b", np.geomspace(30.0, 2000.0, 8).tolist(), noise=noise)
+    scenes = shipped("fig6b", np.geomspace(30.0, 2000.0, 5).tolist(), noise=noise)
     return [with_value(replace(each, hand=Hand(force=sine)), "hand.force.amplitude", 0.02 * i + 0.01)
             for i, each in enumerate(scenes)]  # fmt: skip
 
