@@ -44,5 +44,18 @@ def test_a_hand_that_moves_by_rounding_alone_has_no_harder_hold():
     of = replace(scene(**pressed()), hand=hand)
     assert of.wall
     time = Timebase.from_scene(of)
-    assert harder_hold(of, time, time.ticks, 0.0) is None
-    assert push_of(0.0, of) == pytest.approx(0.3 * 50.0 * (-2.6e-3 - of.wall.position))
+    assert harder_hold(of, time, time.ticks, 0.0, of.wall.position) is None
+    assert push_of(0.0, hand, of.wall.position) == pytest.approx(0.3 * 50.0 * (-2.6e-3 - of.wall.position))
+
+
+def test_a_wall_that_an_event_moved_is_where_the_hand_presses_it():
+    """The spring of its hand is stretched half as far there."""
+    of = load(SCENES / "demo.toml", [
+        'event=[{at=0.5, set={"wall.position"="-8.3 mm"}}]', "duration=1", "hand.force.value=0", "hand.rest=-0.0166",
+        "hand.stiffness=100",
+    ], registry())  # fmt: skip
+    assert of.wall
+    assert of.wall.position > -0.005
+    pushes_N = [result["stability"]["push_N"] for result in run_batch([of, of], registry(), fewest=2)]
+    assert pushes_N == pytest.approx([0.3 * 100.0 * 0.0083] * 2)
+    assert run_in_process(of, registry())["stability"]["push_N"] == pushes_N[0]

@@ -144,7 +144,7 @@ def judge(
     swings of an unstable loop, but wide ones not: where somebody asks, what rests is pushed without it as well. A loop
     that rests at the last hold of a hand that moves is judged at its hardest hold, too.
     """
-    push_N = push_of(end.hold_N, end.scene)
+    push_N = push_of(end.hold_N, end.scene.hand, end.wall_m)
     pushes_N = push_N * SMALLER, push_N
     found, x = _watched(end, pushes_N, looks_s)
     if found.word == "limit-cycle":
@@ -154,7 +154,9 @@ def judge(
     for blow in blows:
         if is_struck(found):
             found = found.after_blow(_watched(end, (push_N * blow,), looks_s)[0])
-    harder_N = harder_hold(end.scene, end.time, end.plant.reached, end.hold_N) if found.word == "steady" else None
+    harder_N = None
+    if found.word == "steady":
+        harder_N = harder_hold(end.scene, end.time, end.plant.reached, end.hold_N, end.wall_m)
     if harder_N is not None:
         found = found.held_harder(harder_N, judge(replace(end, hold_N=harder_N), looks_s, blows=blows))
     if frictionless and is_struck(found) and end.scene.friction:

@@ -60,12 +60,9 @@ def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s:
             blows, _ = _watched(end, members[struck], hold_N[struck], push_N[struck] * blow, (1.0,), looks_s)
             for place, of_blow in zip(struck, blows, strict=True):
                 found[place] = found[place].after_blow(of_blow)
-    harder_N = {
-        place: harder
-        for place, each in enumerate(found)
-        if each.word == "steady"
-        and (harder := harder_hold(end.scenes[members[place]], end.time, end.tick, float(hold_N[place]))) is not None
-    }
+    rests = [place for place, each in enumerate(found) if each.word == "steady"]
+    hardest = {place: _harder(end, members[place], float(hold_N[place])) for place in rests}
+    harder_N = {place: hold for place, hold in hardest.items() if hold is not None}
     if harder_N:
         at_hardest = _judge_some(end, members[[*harder_N]], np.array([*harder_N.values()]), looks_s)
         for (place, harder), there in zip(harder_N.items(), at_hardest, strict=True):
@@ -74,7 +71,12 @@ def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s:
 
 
 def _pushes(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray) -> np.ndarray:
-    return np.array([push_of(hold, end.scenes[i]) for i, hold in zip(members, hold_N.tolist(), strict=True)])
+    holds = zip(members.tolist(), hold_N.tolist(), strict=True)
+    return np.array([push_of(hold, end.scenes[i].hand, _wall_m(end, i)) for i, hold in holds])
+
+
+def _harder(end: BatchEnd, member: int, hold_N: float) -> float | None:
+    return harder_hold(end.scenes[member], end.time, end.tick, hold_N, _wall_m(end, member))
 
 
 def _without_friction(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, found: list[Finding]) -> list[Finding]:
@@ -149,6 +151,11 @@ def _with_chaos(
             other = traces.get(copy, gone.get(copy, x[:0]))
             found[place] = replace(found[place], chaotic=parts(x, other, found[place].width_m))
     return found
+
+
+def _wall_m(end: BatchEnd, member: int) -> float:
+    """Returns the position of a member's wall, which an event may have moved, m."""
+    return float(np.ravel(_wall_of(end, member).position)[0])
 
 
 def _wall_of(end: BatchEnd, place: int | np.ndarray) -> Wall:

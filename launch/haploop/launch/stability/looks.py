@@ -10,7 +10,7 @@ from haploop.launch.stability.decide import HAND_MOVES, NOISE, Finding, decide
 from haploop.launch.stability.still_hand import LEAST_PRESS_N, press_of
 from haploop.launch.stability.swing import Pushed, measure
 from haploop.protocol.scene.hand_force import constant_from_s
-from haploop.protocol.scene.scene import Scene
+from haploop.protocol.scene.scene import Hand, Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.walls.wall import Wall
 
@@ -47,9 +47,9 @@ def parts(one: np.ndarray, other: np.ndarray, width_m: float) -> bool:
     return bool(apart[:eighth].min() < 0.01 * width_m and apart[-2 * eighth :].max() > _APART * width_m)
 
 
-def push_of(hold_N: float, scene: Scene) -> float:
-    """Returns the larger push of a loop whose hand is held at a force, N."""
-    press_N = press_of(hold_N, scene)
+def push_of(hold_N: float, hand: Hand | None, wall_m: float) -> float:
+    """Returns the larger push of a loop whose hand is held at a force against a wall at a position, N."""
+    press_N = press_of(hold_N, hand, wall_m)
     return PUSH * max(abs(press_N), LEAST_PRESS_N) * (1.0 if press_N > 0.0 else -1.0)
 
 

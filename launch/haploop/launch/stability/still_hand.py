@@ -42,6 +42,11 @@ class End:
     controller: Controller
     hold_N: float
 
+    @property
+    def wall_m(self) -> float:
+        """Position of the wall, which an event may have moved, m."""
+        return float(self.controller.params.wall.position)
+
 
 class StillHand:
     """A loop that goes on with a still hand; the run itself is not touched.
@@ -135,18 +140,17 @@ def hold_of(scene: Scene, time: Timebase, last: int, inside: np.ndarray) -> floa
     return float(force.at_steps((last - len(inside)) * n, last * n)[::n][inside].mean())
 
 
-def press_of(hold_N: float, scene: Scene) -> float:
+def press_of(hold_N: float, hand: Hand | None, wall_m: float) -> float:
     """Returns by how much a hand held at a force presses, N: with its spring at the wall, where that presses more."""
-    if not (scene.hand and scene.wall):
-        return hold_N
-    with_spring_N = hold_N + scene.hand.stiffness * (scene.hand.rest - scene.wall.position)
+    with_spring_N = hold_N + hand.stiffness * (hand.rest - wall_m) if hand else hold_N
     return max(hold_N, with_spring_N, key=abs)
 
 
-def harder_hold(scene: Scene, time: Timebase, last: int, hold_N: float) -> float | None:
+def harder_hold(scene: Scene, time: Timebase, last: int, hold_N: float, wall_m: float) -> float | None:
     """Returns the hardest hold in N of a hand that moves, before tick ``last``; None where ``hold_N`` is about that.
 
-    It is the largest mean over a quarter of a second: a hand that trembles faster holds what it does on average.
+    The wall is at ``wall_m``. It is the largest mean over a quarter of a second: a hand that trembles faster holds what
+    it does on average.
     """
     table = scene.hand.force if scene.hand else None
     if math.isfinite(constant_from_s(table)):
@@ -156,8 +160,8 @@ def harder_hold(scene: Scene, time: Timebase, last: int, hold_N: float) -> float
     force = HandForce(table, time.plant_rate).at_steps(first * n, last * n)[::n]
     sums = np.cumsum(np.concatenate([[0.0], force]))
     means = (sums[ticks:] - sums[:-ticks]) / ticks
-    press_N = press_of(hold_N, scene)
+    press_N = press_of(hold_N, scene.hand, wall_m)
     hardest = float(means[np.argmax(means * np.sign(press_N))]) if len(means) else hold_N
-    most_N = press_of(hardest, scene)
+    most_N = press_of(hardest, scene.hand, wall_m)
     is_harder = abs(most_N) > max(_HARDER * abs(press_N), LEAST_PRESS_N) and most_N * press_N > 0.0
     return hardest if is_harder else None
