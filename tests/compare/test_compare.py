@@ -273,7 +273,7 @@ def test_a_comparison_tells_in_python_what_to_take_and_prints_as_the_command_doe
     assert same.recommended == {"element": "nothing", "held_N_m": pytest.approx(1000.0), "parameters": {}}
     assert repr(told).startswith("<Comparison on a device: ")
     assert "\n" not in repr(told)
-    assert str(told).startswith("All stabilizers on a device, each tuned alike.")
+    assert str(told).startswith("All stabilizers on a device, each tuned alike: for comparing, not for building.")
     assert comparison_data(told)["recommended"] == told.recommended
 
 
