@@ -270,7 +270,8 @@ def test_a_scene_given_as_a_sweep_is_said_to_be_one_and_a_sweep_without_its_axes
     [mistake] = caught.value.mistakes
     assert mistake.expected.startswith("This is a scene, for haploop run.")
     assert 'scene = "press.toml"' in mistake.expected
-    assert "axes" in mistakes(tmp_path, "")
+    [without_axes] = mistakes(tmp_path, "")
+    assert without_axes.startswith("axes is missing.")
 
 
 def test_what_is_recorded_may_come_from_any_corner_of_the_grid(tmp_path: Path) -> None:
