@@ -59,7 +59,7 @@ def digest_of(seed: int) -> str:
 def cells(path: Path) -> list[Scene]:
     """Scenes from all over a shipped sweep, for a short while."""
     sweep = load(path)
-    return [replace(sweep.scene(cell), duration=0.2) for cell in range(0, sweep.count, -(-sweep.count // 20))]
+    return [replace(sweep.scene(cell), duration=0.2) for cell in range(0, sweep.count, -(-sweep.count // 10))]
 
 
 @pytest.mark.slow

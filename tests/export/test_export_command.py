@@ -153,7 +153,7 @@ def test_a_longer_log_takes_no_more_memory(to: str, tmp_path: Path) -> None:
     """Its columns are 61 MB more and may cost half of that: the whole process is measured, 16 MB of it chance.
     Text takes long to write, and chance is little there: logs of a third."""
     needs(to)
-    sizes, more_kb = ((20_000, 70_000), 10_000) if to in ("csv", "json-mcap") else ((60_000, 200_000), 30_000)
+    sizes, more_kb = ((12_000, 42_000), 8_000) if to in ("csv", "json-mcap") else ((60_000, 200_000), 30_000)
     held_kb = []
     for ticks in sizes:
         run = swapped_run(tmp_path / str(ticks), ticks, hard=False, flush_ticks=1000)

@@ -80,6 +80,8 @@ class StillBatch(BatchLoop):
         return left
 
     def _go_until(self, end: int) -> list[tuple[int, np.ndarray]]:
+        if not len(self.copy):
+            return []
         ticks = self._traces.shape[1]
         more = np.empty((2, end - self._tick, len(self.copy)))
         remembers = memory_of(self._controller, len(self.copy)).size
@@ -97,7 +99,7 @@ class StillBatch(BatchLoop):
                 if np.count_nonzero(self._gone) > self._unheeded * len(self._gone):
                     self.keep(~self._gone)
                     traces = self._traces
-            if ticks in looks:
+            if ticks in looks and len(self.copy):
                 self._memory.append((ticks, memory_of(self._controller, len(self.copy))))
             if self._tick % _FORGET_TICKS == 0:
                 self._forget()

@@ -168,9 +168,9 @@ def sizes_of(kind: str, small: bool) -> np.ndarray:
     if kind == KINDS[0]:
         return np.zeros((1, 1))
     if kind == "both":
-        step = 6 if small else 1
+        step = 9 if small else 1
         return np.array([*product(PAIR_DAMPINGS[::step], PAIR_MASSES[::step])])
-    return (DAMPINGS if kind == KINDS[1] else MASSES)[:: 8 if small else 1, None]
+    return (DAMPINGS if kind == KINDS[1] else MASSES)[:: 12 if small else 1, None]
 
 
 class Presses(NamedTuple):
