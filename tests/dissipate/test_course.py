@@ -74,6 +74,19 @@ def test_of_two_buzzes_too_close_to_be_told_apart_the_width_varies_up_to_that_of
         assert found.least_m == pytest.approx(3e-4 * (1.0 - share), abs=4e-5)
 
 
+@pytest.mark.parametrize("frequency_Hz", [18.0, 40.0])
+@pytest.mark.parametrize("within_s", [0.6, 0.8, 1.0, 1.5])
+def test_of_a_swing_that_dies_soon_after_its_onset_it_is_never_told_that_it_stayed_as_wide(
+    frequency_Hz: float, within_s: float
+) -> None:
+    for begins_s in (0.0, 0.87, 1.0):
+        since_s = S - begins_s
+        along_m = 3e-3 * (since_s >= 0.0) * np.exp(-np.maximum(since_s, 0.0) / within_s)
+        x_m = 0.5 * along_m * np.sin(2.0 * np.pi * frequency_Hz * since_s) - 1e-2 * np.clip(S, 0.0, begins_s)
+        found = buzz_of(np.round(x_m / 1e-5) * 1e-5)
+        assert found is None or found.course in ("died down", None)
+
+
 def test_report_and_json_say_of_a_beating_buzz_that_its_width_varied_and_do_not_say_that_it_grew(
     tmp_path: Path,
 ) -> None:

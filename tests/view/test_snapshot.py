@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -113,6 +114,15 @@ def test_of_a_wall_that_is_no_spring_the_loop_has_the_curve_that_it_stores() -> 
     arcs = np.where(ridge < 0.5, 16 * ridge * (0.5 - ridge), -16 * (ridge - 0.5) * (1.0 - ridge))
     np.testing.assert_allclose(force, 100.0 * np.array(depth) + 2.0 * arcs, rtol=1e-12)
     assert "curve" not in drawn(made_up())["tables"]["loop"]
+
+
+def test_of_a_wall_whose_law_is_not_known_here_no_ideal_one_is_drawn() -> None:
+    """That of a file is code, which a viewer does not read; a spring of its stiffness would be another wall."""
+    unknown = replace(WALL, kind="deadband")
+    loop = drawn(made_up(wall=unknown))["tables"]["loop"]
+    assert loop["stiffness"] is None
+    assert "curve" not in loop
+    assert drawn(made_up())["tables"]["loop"]["stiffness"] is not None
 
 
 def test_without_a_wall_there_is_none_to_draw_and_no_loop():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
@@ -88,7 +87,8 @@ def _force_position(history: History, first: int, end: int) -> Table | None:
 
     The force is the one applied, total of wall and elements, held while the position moves on. Where it runs
     counter-clockwise, the area within is energy given to the device. ``stiffness`` (N/m) is that of the ideal spring;
-    of a wall that is none, ``curve`` has depths (m) and the forces (N) that it stores there.
+    of a wall that is none, ``curve`` has depths (m) and the forces (N) that it stores there; None of both where its law
+    is not known.
     """
     first, end = _last(history, history.steps, first, end)
     inward = history.at_work.into_wall
@@ -103,10 +103,12 @@ def _force_position(history: History, first: int, end: int) -> Table | None:
     columns = [Column("penetration", "m", "penetration"), Column("force", "N", "force out of the wall")]
     known = stiffness[np.isfinite(stiffness)]
     more: dict[str, Any] = {"stiffness": float(known[-1]) if len(known) else None}
-    with suppress(KeyError):  # the wall of a package that is not installed
+    try:
         if not isinstance(wall := make_wall(history.at_work.wall), Spring):
             curve = np.linspace(0.0, max(float(depth.max()), 0.0), _CURVE)
             more["curve"] = [curve.tolist(), wall.held(curve).tolist()]
+    except KeyError:  # the wall of a file, or of a package that is not installed: no spring, and not known here
+        more["stiffness"] = None
     return Table("loop", first / time.control_rate, each / time.plant_rate, columns, values, more=more)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import sys
 import time
 from collections.abc import Sequence
@@ -115,7 +116,8 @@ def _run(request: Request, made: Sweep, directory: Path) -> Summary:
                     found = Engine(made, store, pool, progress, stop, request.compiled).run()
                 except Stopped:
                     ended = "stopped"
-            missing = sum(bool(boundary.why) for boundary in found)
+            missing = sum(math.isnan(boundary.near) for boundary in found)
+            undecided = sum(bool(boundary.why) for boundary in found) - missing
             ran_s = time.monotonic() - began
             summary = {
                 "title": made.title,
@@ -129,7 +131,8 @@ def _run(request: Request, made: Sweep, directory: Path) -> Summary:
                 "cells": sum(progress.counts.values()),
                 "counts": dict(progress.counts),
                 "first_reason": progress.reason,
-                **({"boundaries": {"found": len(found) - missing, "missing": missing}} if found else {}),
+                "provisos": dict(progress.provisos),
+                **({"boundaries": _counted(len(found) - missing, undecided, missing)} if found else {}),
                 "wall_s": before_s + ran_s,
                 "rate_1_s": progress.ran / ran_s,
                 "workers": pool.count,
@@ -141,6 +144,11 @@ def _run(request: Request, made: Sweep, directory: Path) -> Summary:
         except OSError as error:
             raise StoreError(f"{path} could not be written: {error.strerror}.") from error
     return summary
+
+
+def _counted(found: int, undecided: int, missing: int) -> dict[str, int]:
+    """Returns how many boundaries were found, over how many of these it is undecided, and how many are missing."""
+    return {"found": found, "undecided": undecided, "missing": missing}
 
 
 def _directory(request: Request, made: Sweep) -> Path:
@@ -180,8 +188,11 @@ def _first_difference(there: str, here: str) -> str:
 def _summary_sentences(summary: Summary) -> str:
     rate = summary["rate_1_s"]
     lines = [f"{summary['title']}: {summary['cells']} cells, {describe_counts(summary['counts'])}, {rate:.3g} cells/s"]
+    if provisos := summary.get("provisos"):
+        lines.append(f"of the steady cells: {describe_counts(provisos)}")
     if bounds := summary.get("boundaries"):
-        lines.append(f"boundaries: {bounds['found']} found, {bounds['missing']} missing")
+        undecided = f", {count} of them across undecided cells" if (count := bounds.get("undecided")) else ""
+        lines.append(f"boundaries: {bounds['found']} found{undecided}; {bounds['missing']} missing")
     if summary["first_reason"]:
         lines.append(f"first cell without a verdict: {summary['first_reason']}")
     return "\n".join(lines)

@@ -16,7 +16,21 @@ from haploop.tools.sweep.boundary import Boundary, Candidate, find_boundaries, v
 from haploop.tools.sweep.cells import Axis, Bisect, Extra, Item, Sweep
 from haploop.tools.sweep.record import VERDICT, wants_energy, wants_trajectories
 from haploop.tools.sweep.store import Store
-from haploop.tools.sweep.table import CELL, ENDED, NUMBER, SEED, TEXT, WHOLE, WHY, Column, Row, make_schema, make_table
+from haploop.tools.sweep.table import (
+    CELL,
+    ENDED,
+    JOINS,
+    NUMBER,
+    PROVISOS,
+    SEED,
+    TEXT,
+    WHOLE,
+    WHY,
+    Column,
+    Row,
+    make_schema,
+    make_table,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -33,12 +47,13 @@ class SweepProgress:
 
     Attributes:
         counts: of all rows, those of earlier calls too, by verdict, or by how a run ended that has none.
+        provisos: of the steady ones, what they rest on.
     """
 
     def __init__(self, title: str, terminal: Console | None = None) -> None:
         from rich import progress
 
-        self.counts: Counter[str] = Counter()
+        self.counts, self.provisos = Counter[str](), Counter[str]()
         self.ran, self.reason = 0, ""
         self._total, self._stopping = 0, False
         self._began = time.monotonic()
@@ -72,6 +87,9 @@ class SweepProgress:
     def add_rows(self, rows: Sequence[Row], stored: bool = False) -> None:
         """Takes cells that are done; ``stored`` are those of an earlier call."""
         self.counts.update(outcome(row) for row in rows)
+        for row in rows:
+            if row.get(VERDICT) == "steady":
+                self.provisos.update(filter(None, str(row.get(PROVISOS) or "").split(JOINS)))
         if not stored:
             self.ran += len(rows)
             self.reason = self.reason or next((row[WHY] for row in rows if not row.get(VERDICT)), "")

@@ -13,7 +13,7 @@ from haploop.launch.spec import RunFailed
 from haploop.logger.summary import OF_THE_MACHINE, Summary
 from haploop.protocol.names import nearest
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.sweep.table import ENDED, NUMBER, TEXT, TRUTH, WHY, Column
+from haploop.tools.sweep.table import ENDED, NUMBER, PROVISOS, TEXT, TRUTH, WHY, Column
 
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
@@ -28,7 +28,7 @@ Complain = Callable[[int, str, str | None], None]
 
 def usual(base: Scene) -> list[str]:
     """Returns the keys that are recorded unless others are asked for."""
-    return [*_USUAL, *(["stability.width_m", "stability.provisos"] if base.run.verdict == "pushed" else [])]
+    return [*_USUAL, *(["stability.width_m", PROVISOS] if base.run.verdict == "pushed" else [])]
 
 
 def make_columns(

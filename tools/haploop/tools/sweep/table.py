@@ -22,6 +22,8 @@ CELL, SEED, ENDED, WHY, SCENE = "cell", "seed", "ended", "why", "scene"
 NUMBER, WHOLE, TEXT, TRUTH = "float64", "int64", "string", "bool"
 # Stands between the texts of a list that is recorded.
 JOINS = "; "
+# What a verdict rests on.
+PROVISOS = "stability.provisos"
 # A row by column: numbers, text, truth values, None where there is nothing.
 Row = dict[str, Any]
 # What sweep.toml holds: title, repeat, record, axes (values by key), bisect and base, the tables of the scene.

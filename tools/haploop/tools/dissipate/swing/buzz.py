@@ -66,7 +66,8 @@ class Buzz:
             a drift, to 3 % beside a hand's motion fifteen times as wide. Overtones may add some percent. Where it
             changes within a window, that of its widest three periods, to some 5 %.
         course: whether it stayed as wide, or grew or died down all the way but for little, by a fifth at least; else
-            its width varied, as that of two buzzes does that are too close to be told apart; None of several stretches.
+            its width varied, as that of two buzzes does that are too close to be told apart; None of several stretches,
+            and of one that lasts hardly longer than a window, so that less than 0.4 of it is surely filled.
         first_m, last_m: widths where it begins and ends; where it stayed as wide those of the third window, which it
             fills, and of the last, or the last but two where it ends before the recording does.
         least_m: least width of what it fills.

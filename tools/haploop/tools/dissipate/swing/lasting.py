@@ -9,7 +9,7 @@ import numpy as np
 from haploop.tools.dissipate.swing.buzz import Band, Buzz, Overtone, Span
 from haploop.tools.dissipate.swing.course import course
 from haploop.tools.dissipate.swing.lines import Slower, is_overtone
-from haploop.tools.dissipate.swing.windows import THIRD, End, Window, along_m
+from haploop.tools.dissipate.swing.windows import THIRD, End, Window, along_m, is_seen
 
 # The windows are a quarter of one apart; so many after the first have to swing as well for a swing to last.
 HOPS = 4
@@ -65,9 +65,9 @@ def make_buzz(
     least_m = min(window.line.width for window in told)
     if len(spans) == 1:
         found_m, error_m = along_m(told, ends)
-        word = course(found_m, error_m)
+        word = course(found_m, error_m) if is_seen(told, found_m) else None
         width_m = max(window.line.width for window in told)
-        if word != "stayed":
+        if word not in ("stayed", None):
             first_m, last_m, least_m = found_m[0], found_m[-1], found_m.min()
             width_m = max(width_m, found_m.max())
         spans = (spans[0]._replace(width_m=float(width_m)),)

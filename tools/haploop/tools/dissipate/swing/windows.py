@@ -14,6 +14,8 @@ from haploop.view.look.spectrum import Line
 # The middle quarter of a window by its places, and what is before and after with it.
 _MIDDLE = slice(3 * PLACES // 8, 5 * PLACES // 8)
 _TO_MIDDLE, _FROM_MIDDLE = slice(_MIDDLE.stop), slice(_MIDDLE.start, PLACES)
+# Of a swing that lasts hardly longer than a window less of it is seen than this share: whether it dies is not told.
+_SEEN = 0.4
 # Of the windows of a swing the first and the last may be empty for about a quarter; the third is full.
 THIRD = 2
 
@@ -73,3 +75,9 @@ def along_m(told: list[Window], ends: Mapping[float, End]) -> tuple[Floats, floa
         found_m.append(along.width_m[places][is_later])
         last_s = max(last_s, float(at_s[-1]))
     return np.concatenate(found_m), float(np.median([window.widths.error_m for window in some]))
+
+
+def is_seen(told: list[Window], width_m: Floats) -> bool:
+    """Tells whether widths of ``along_m`` are those of enough of a swing to say what became of it."""
+    lasts_s = told[-1].to_s - told[0].from_s
+    return len(width_m) / PLACES * told[0].at_s[1] >= _SEEN * lasts_s

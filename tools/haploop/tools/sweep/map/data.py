@@ -14,10 +14,9 @@ import numpy as np
 from haploop.logger.verdict.measures import OF_WINDOW
 from haploop.tools.figure.data import FigureError
 from haploop.tools.sweep.map.axis import Axis
-from haploop.tools.sweep.table import JOINS, ResolvedSweep
+from haploop.tools.sweep.table import JOINS, PROVISOS, ResolvedSweep
 
 AMPLITUDE, WIDTH, STIFFNESS = "window.oscillation_m", "stability.width_m", "wall.stiffness"
-PROVISOS = "stability.provisos"
 NOT_RUN = -1
 MOST_PANELS = 12
 # By name, equally long: lists or NumPy arrays.

@@ -30,7 +30,8 @@ class Edges:
         holds: the verdict on the near side, in words.
         rising: whether the search went towards greater values.
         state: a ``State``; of seeds that differ, that of the seed that holds least far.
-        nearest, low, high: the boundary of the seed that holds least far; the brackets of all seeds together.
+        nearest: the last value at which the seed that holds least far was seen to hold.
+        low, high: the brackets of all seeds together.
         more: how often a seed changed more than once at the planned points.
     """
 
@@ -43,6 +44,10 @@ class Edges:
     low: np.ndarray
     high: np.ndarray
     more: int
+
+    @property
+    def reaches(self) -> str:
+        return "up to" if self.rising else "down to"
 
     @property
     def begin(self) -> str:
@@ -67,7 +72,7 @@ def find_edges(data: MapData) -> Edges:
     verdicts = [data.columns["verdict"][row] for row in begin.tolist()]
     starts = dict(zip(_places(data.columns, others, begin), verdicts, strict=True))
     for row, place in enumerate(_places(table, others, np.arange(len(table["low"])))):
-        at, value, started = place[:-1], float(table["boundary"][row]), starts.get(place)
+        at, value, started = place[:-1], float(table["low" if rising else "high"][row]), starts.get(place)
         if math.isfinite(float(table["low"][row])):
             seen = State.FOUND
         elif verdict_number(started) == Verdict.FAILED:
@@ -119,7 +124,7 @@ def furthest(edges: Edges) -> Answer | None:
     """Finds what holds furthest from where the search begins; None where no boundary was found and nothing holds."""
     if (throughout := np.argwhere(edges.state == State.ALL_HOLD)).size:
         end = -1 if edges.rising else 0
-        words = f"{edges.holds} up to {edges.along.word(end)} and perhaps beyond"
+        words = f"{edges.holds} {edges.reaches} {edges.along.word(end)} and perhaps beyond"
         middle = tuple(int(i) for i in throughout[len(throughout) // 2])
         return Answer(middle, float(edges.along.values[end]), (words,), open_end=True)
     found = edges.state == State.FOUND
@@ -128,7 +133,18 @@ def furthest(edges: Edges) -> Answer | None:
     far = np.where(found, edges.nearest if edges.rising else -edges.nearest, -np.inf)
     index = tuple(int(i) for i in np.unravel_index(int(far.argmax()), far.shape))
     value = float(edges.nearest[index])
-    return Answer(index, value, (f"{edges.holds} up to {with_unit(value, edges.along.unit)}",), open_end=False)
+    told = with_unit(_towards(value, down=edges.rising), edges.along.unit)
+    return Answer(index, value, (f"{edges.holds} {edges.reaches} {told}",), open_end=False)
+
+
+def _towards(value: float, *, down: bool) -> float:
+    """Returns a value with four digits, none of them beyond it."""
+    if not value:
+        return value
+    step = 10.0 ** (math.floor(math.log10(abs(value))) - 3)
+    # What four digits hold already stays, however it is rounded.
+    steps = math.floor(value / step + 1e-6) if down else math.ceil(value / step - 1e-6)
+    return float(f"{steps * step:.4g}")
 
 
 def stiffest_steady(axes: Sequence[Axis], cells: Cells, steady_word: str = "steady") -> Answer | None:

@@ -137,11 +137,12 @@ def edge_notes(data: MapData, edges: Edges, best: Answer | None, lines: Sequence
     """Returns the notes beside the boundaries of a search, of which these lines are drawn; the answer first."""
     reasons, holds = _reasons(lines), edges.holds
     rows = len(edges.others[1].values) if len(edges.others) > 1 else 1
-    more = f"; a point is the seed that is {holds} least far, its bar covers all seeds" if len(data.seeds) > 1 else ""
+    more = " under the seed that is so least far, bars of all seeds" if len(data.seeds) > 1 else ""
     return _those({
         f"★ Furthest: {best.words[0]}{_place(zip(edges.others, best.index, strict=True))}." if best else "": True,
         f"The first {len(lines)} of {rows} lines are drawn.": len(lines) < rows,
-        f"Upright bars are the brackets{more}. Each boundary is the first change from {edges.begin} on.": True,
+        f"Points are the last values that were seen to be {holds}{more}; upright bars reach to the first that was seen "
+        f"not to be, over what is undecided. Each boundary is the first change from {edges.begin} on.": True,
         f"{'▲' if edges.rising else '▼'} {holds} at every point that was tried.": State.ALL_HOLD in edges.state,
         f"× not {holds} where the search begins.": State.NONE_HOLDS in edges.state,
         "? a run failed before a boundary was found.": State.UNKNOWN in edges.state,
