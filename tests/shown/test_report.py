@@ -167,6 +167,7 @@ def test_the_progress_line_is_silent_without_a_terminal(capsys: pytest.CaptureFi
     with ProgressLine("title", 3.0) as line:
         line.update(STATUS)
         line.update({})
+        line.judging()
     assert capsys.readouterr() == ("", "")
 
 
@@ -176,7 +177,8 @@ def test_the_progress_line_shows_time_verdict_oscillation_and_residual_on_a_term
         line.announce("a1b2c3")
         line.update({})
         line.update(STATUS)
-    for words in ("a1b2c3", "1.25/3 s", "swinging", "1.23 mm", "residual 3e-18 J"):
+        line.judging()
+    for words in ("a1b2c3", "1.25/3 s", "swinging", "1.23 mm", "residual 3e-18 J", "to be judged"):
         assert words in screen.getvalue()
 
 

@@ -58,6 +58,7 @@ class RunSpec:
         on_progress: called now and then with the logger's status.
         on_started: called once with the run's id, and the clock's address where that is one of TCP. For processes
             only.
+        on_judging: called when the run is over and is gone through again to be judged. For processes only.
         start_gate: given the pids of all nodes that are ready, returns whether the first tick may be worked on. It is
             asked again until it says so; for a process that is to be there from the start. For processes only.
     """
@@ -76,6 +77,7 @@ class RunSpec:
     wait_s: float = WAIT_S
     on_progress: Callable[[Message], None] = lambda status: None
     on_started: Callable[[str], None] = lambda run_id: None
+    on_judging: Callable[[], None] = lambda: None
     start_gate: Callable[[set[int]], bool] = lambda ready: True
     is_new: bool = False
 

@@ -184,6 +184,7 @@ def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) ->
     from haploop.launch.stability.judge import with_verdict
 
     def judged() -> Finding:
+        spec.on_judging()
         if spec.plugins:
             return judge_elsewhere(spec.scene, spec.plugins, events)
         return find(spec.scene, spec.kinds, events)

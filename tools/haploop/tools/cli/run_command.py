@@ -115,6 +115,7 @@ def run(
                     wait_s=wait_s,
                     on_progress=line.update,
                     on_started=told,
+                    on_judging=line.judging,
                     start_gate=viewer.may_start,
                 )
         except RunFailed as error:

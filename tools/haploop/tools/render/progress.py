@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 # Names a stage of so many parts; what it returns is called after each of them.
 Stage = Callable[[str, int], Callable[[], None]]
 _REFRESH_S = 0.1
+_JUDGING = "The run is over; its end is held still and pushed, to be judged. Ctrl-C leaves it unjudged."
 # Lines of a stage where there is no terminal.
 _LINES = 10
 # Columns that all but the bar need, and the bar's bounds.
@@ -73,6 +74,11 @@ class ProgressLine:
         if self._live:
             factor = done_s / elapsed_s if elapsed_s > 0 else 0.0
             self._live.update(self.line(status, factor, self._live.console.width), refresh=True)
+
+    def judging(self) -> None:
+        """Shows that the run is over and is being judged."""
+        if self._live:
+            self._live.update(_JUDGING, refresh=True)
 
     def line(self, status: Message, factor: float, width: int) -> Text:
         """Makes the line for a status of the logger, cut to ``width`` columns.
