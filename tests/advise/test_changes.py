@@ -6,12 +6,14 @@ import inspect
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from haploop.protocol.scene.paths import value_at, with_value
+from haploop.protocol.scene.scene import ElementTable
 from haploop.tools.advise import advice as of_advice
 from haploop.tools.advise import search as of_search
 from haploop.tools.advise.advice import Changed
@@ -25,7 +27,10 @@ from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.walls.store import Failure, Job, Store
 from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.advise.withstand import Best
+from helpers.data.advices import ADVICE
+from helpers.scenes.least import scene
 from helpers.scenes.presets import loop_of
+from helpers.scenes.pressed import pressed
 from helpers.shown import row, shown
 
 LATE, EARLY = (loop_of("premium15", f"clock.round_trip_delay={delay}") for delay in (1.5e-3, 0.7e-3))
@@ -94,6 +99,7 @@ def told_with(row: Changed, values: Values = (5.0,)) -> dict[str, str]:
     told: Any = SimpleNamespace(
         is_ideal=False, hand=None, provisos=("only friction holds it",), changed=(row,), without=(), published=(),
         own=None, found=found_with(DAMPING if values else NOTHING, values, 3230.0, 1660.0), breaks=None, assumed=(),
+        scene=None,
     )  # fmt: skip
     return dict(answer(told))
 
@@ -120,6 +126,18 @@ def test_what_the_verdict_says_beside_its_word_has_a_line_of_its_own() -> None:
     both = describe_run(("only friction holds it", "at some holds of its hand", "its force ripples"))
     assert "only friction holds it, its force ripples; the pushes of that verdict are at some holds" in both
     assert both.endswith("the safe wall was tried at all of them")
+
+
+def test_by_how_much_the_force_jumps_where_a_count_is_crossed_is_told_of_damping_and_inertia_together() -> None:
+    """B q / T + m q / T²: 20 N s/m and 7.5 g behind 20 um at 1 kHz jump by 0.4 N and 0.15 N."""
+    elements = tuple(
+        ElementTable(name=kind, acts="in-contact", parameters=parameters)
+        for kind, parameters in (("damping", {"damping": 20.0}), ("bidirectional-inertia", {"mass": 7.5e-3}))
+    )
+    of = replace(scene(**pressed(encoder={"resolution": 2e-5})), dissipation=elements)
+    told = dict(answer(replace(ADVICE, scene=of)))
+    assert "jumps by up to 550 mN" in told["at a count"]
+    assert "at a count" not in dict(answer(replace(ADVICE, scene=replace(of, encoder=None))))
 
 
 def test_a_factor_within_what_both_limits_are_known_to_is_told_as_no_change() -> None:

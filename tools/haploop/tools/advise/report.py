@@ -14,6 +14,8 @@ from haploop.tools.advise.changes import CLOSE
 from haploop.tools.advise.walls.limit import LEAST_N_M, Limit
 from haploop.tools.advise.walls.store import Failure
 from haploop.tools.advise.withstand import ROUGH, WORTH, Best
+from haploop.tools.linear.linearity import installed_kinds
+from haploop.tools.linear.terms import one_count
 from haploop.tools.render.terminal import make_facts, make_table
 from haploop.tools.render.units import amount, fixed
 
@@ -37,6 +39,7 @@ _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
 _SOME_HOLDS = "at some holds of its hand"
 _ADDS = "of advice.toml, haploop run says beside its verdict: {0}"
 _PUSHED = "the pushes of that verdict are at some holds of its hand, the safe wall was tried at all of them"
+_KICK = "of the encoder the element's force jumps by up to {0}: grit in a slow press, which is no swing"
 _ALONE = "{0} without one, searched and attacked alike"
 # What is assumed, how much that costs, and what to measure.
 _ASSUMED = "{0}, neither measured nor published: the wall bears half and twice of {1}. {2}"
@@ -69,6 +72,8 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     lines = [("at most" if told.is_ideal else "safe up to", safe if found.stiffness_N_m else _NO_WALL)]
     if found.stiffness_N_m and told.provisos:
         lines.append(("its run", describe_run(told.provisos)))
+    if kick_N := _kick_N(told):
+        lines.append(("at a count", _KICK.format(amount(kick_N, "N"))))
     lines.append(("for a hand", describe_hand(told)))
     if found.as_assumed:
         lines.append(("assumes", assumes(told, found.as_assumed)))
@@ -122,6 +127,12 @@ def assumes(told: Advice, right: Best) -> str:
 def sentences(told: Advice) -> list[str]:
     """Returns headline and answer as lines of text."""
     return [told.headline, *(f"{name}: {words.rstrip('.')}." for name, words in answer(told))]
+
+
+def _kick_N(told: Advice) -> float:
+    """Returns by how much the advised element's force jumps where a count is crossed, from rest; 0 without either."""
+    of = one_count(told.scene, installed_kinds()) if told.scene and told.found.advised.values else None
+    return sum(of.elements_N) if of else 0.0
 
 
 def describe_run(provisos: Sequence[str]) -> str:
