@@ -114,7 +114,7 @@ def test_what_comes_with_haploop_is_printed_by_its_name_and_can_be_copied():
     assert call("scenes", "premium15").stdout == bundled("devices")["premium15"].read_text()
     unknown = call("scenes", "premium16")
     assert unknown.exit_code == 2
-    assert "premium16 does not come with haploop" in unknown.stderr
+    assert "premium16 does not come with haploop (did you mean premium15?); haploop scenes lists" in unknown.stderr
 
 
 COPIED = [(folder, name) for folder in FOLDERS for name in bundled(folder)]

@@ -102,7 +102,11 @@ def breaks_words(found: Advice) -> str:
         return ": the case that breaks first, to the end of the quarter second in which it is felt"
     shown, told = format_stiffness(scene.wall.stiffness), format_stiffness(broken[0])
     at = f": the case that breaks first, at {shown}"
-    return at if shown == told else f"{at}: at {told} it is felt, yet the verdict of its run is not unsteady"
+    return (
+        at
+        if shown == told
+        else f"{at}: at {told} it is felt, though the verdict of its run does not say that it swings"
+    )
 
 
 def _write(found: Advice, out: Path) -> AdviceData:

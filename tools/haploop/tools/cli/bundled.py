@@ -19,11 +19,13 @@ def scenes(
 ) -> None:
     """List the scenes, devices, hands and sweeps there are. Each is found by its name, after files of your own."""
     from haploop.launch.scene.bundled import FOLDERS, about, bundled, of_name, own_file
+    from haploop.protocol.names import meant
 
     if name is not None:
         path = next(filter(None, (of_name(name, folder) for folder in FOLDERS)), None)
         if path is None:
-            leave(f"{name} does not come with haploop; haploop scenes lists what does.", WRONG_USE)
+            hint = meant(name, [one for folder in FOLDERS for one in bundled(folder)])
+            leave(f"{name} does not come with haploop{hint}; haploop scenes lists what does.", WRONG_USE)
         print(path.read_text(encoding="utf-8"), end="")
         return
     listed = {
