@@ -99,7 +99,7 @@ def test_the_likely_cause_is_told_of_what_swings_alone(swap: dict[str, Any], ver
 def energy(*elements: tuple[str, float], **leak: float) -> dict[str, Any]:
     causes = dict.fromkeys(("delay_J", "sampling_and_hold_J", "quantisation_J"), 0.0) | leak
     booked = [{"kind": kind, "true_J": true_J} for kind, true_J in elements]
-    return {"elements": booked, "wall": {"leak": {"total_J": sum(causes.values()), **causes}}}
+    return {"elements": booked, "wall": {"true_J": -1e-2, "leak": {"total_J": sum(causes.values()), **causes}}}
 
 
 @pytest.mark.parametrize(
@@ -107,6 +107,10 @@ def energy(*elements: tuple[str, float], **leak: float) -> dict[str, Any]:
     [
         (energy(delay_J=-2e-3, sampling_and_hold_J=-1e-3), "3.00 mJ more than an ideal one would have, 67 % of it"),
         (energy(delay_J=1e-3, sampling_and_hold_J=-2e-3), "held for a tick"),
+        (  # its first force comes after the end
+            {**energy(), "wall": {**energy(delay_J=-2e-3)["wall"], "true_J": 0.0}},
+            "the wall moved no energy at all: what moves here is not fed by it",
+        ),
         (energy(quantisation_J=-1e-6), "100 % of it because the encoder rounds"),
         (energy(delay_J=-1e-3, sampling_and_hold_J=2e-3), "no more energy than an ideal one would"),
         (energy(), "no more energy than an ideal one would"),

@@ -102,11 +102,7 @@ def breaks_words(found: Advice) -> str:
         return ": the case that breaks first, to the end of the quarter second in which it is felt"
     shown, told = format_stiffness(scene.wall.stiffness), format_stiffness(broken[0])
     at = f": the case that breaks first, at {shown}"
-    return (
-        at
-        if shown == told
-        else f"{at}: at {told} it is felt, though the verdict of its run does not say that it swings"
-    )
+    return at if shown == told else f"{at}: at {told} it is felt, though its run's verdict does not say that it swings"
 
 
 def _write(found: Advice, out: Path) -> AdviceData:

@@ -18,6 +18,7 @@ _BECAUSE = {
     "quantisation_J": "the encoder rounds the position that the wall answers to",
 }
 _NONE = "{when} the wall gave no more energy than an ideal one would have: what moves here is not fed by the wall."
+_NOTHING = "{when} the wall moved no energy at all: what moves here is not fed by it."
 _WALL = (
     "{when} the wall gave the device {energy} more than an ideal one would have, {share:.0f} % of it because {because}."
 )
@@ -34,6 +35,8 @@ def cause(energy: Summary, when: str = "In all") -> str:
     most_J, element = max(fed, default=(0.0, ""))
     if most_J > max(0.0, -leak["total_J"]):
         return _ELEMENT.format(when=when, element=element, energy=amount(most_J, "J"))
+    if energy["wall"]["true_J"] == 0.0:  # as where its first force comes after the end
+        return _NOTHING.format(when=when)
     if leak["total_J"] >= 0.0 or not (total := sum(given.values())):
         return _NONE.format(when=when)
     most = max(given, key=given.__getitem__)
