@@ -35,7 +35,7 @@ def cause(energy: Summary, when: str = "In all") -> str:
     most_J, element = max(fed, default=(0.0, ""))
     if most_J > max(0.0, -leak["total_J"]):
         return _ELEMENT.format(when=when, element=element, energy=amount(most_J, "J"))
-    if energy["wall"]["true_J"] == 0.0:  # as where its first force comes after the end
+    if energy["wall"].get("true_J") == 0.0:  # as where its first force comes after the end
         return _NOTHING.format(when=when)
     if leak["total_J"] >= 0.0 or not (total := sum(given.values())):
         return _NONE.format(when=when)
