@@ -69,7 +69,7 @@ def test_a_buzz_lasts_as_long_as_it_does_and_to_the_very_end_of_a_short_recordin
     before: bool, after: bool, most: float
 ) -> None:
     errors = []
-    for seed in range(24):
+    for seed in range(12):
         lasts_s, found = drawn(seed, before, after)
         buzz = found.buzz()
         assert buzz is not None
@@ -190,7 +190,7 @@ def _waves(frequency_Hz: float) -> list[Floats]:
 
 
 STILL: dict[str, Callable[[], list[Floats]]] = {
-    "hand": lambda: [3e-3 * wave for f in (0.3, 2.0, 3.0, 4.5, 6.0, 8.0, 10.0) for wave in _waves(f)],
+    "hand": lambda: [3e-3 * wave for f in (0.3, 2.0, 4.5, 8.0, 10.0) for wave in _waves(f)],
     "ramp": lambda: [v * of for v in (1e-3, 5e-3, 2e-2) for of in (S, np.minimum(S, 2.0), np.abs(S - 2.0), S**2)],
     "tap": lambda: [1e-3 * _ring(S - 1.0, f, tau) for f in (20.0, 40.0, 100.0) for tau in (0.05, 0.1, 0.3)],
     "taps": lambda: [

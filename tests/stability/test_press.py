@@ -48,6 +48,7 @@ def test_a_hand_that_moves_by_rounding_alone_has_no_harder_hold():
     assert push_of(0.0, hand, of.wall.position) == pytest.approx(0.3 * 50.0 * (-2.6e-3 - of.wall.position))
 
 
+@pytest.mark.slow
 def test_a_wall_that_an_event_moved_is_where_the_hand_presses_it():
     """The spring of its hand is stretched half as far there."""
     of = load(SCENES / "demo.toml", [
