@@ -168,7 +168,8 @@ def test_the_line_of_the_scene_that_breaks_says_on_which_wall_that_is() -> None:
         told: Any = SimpleNamespace(breaks=scene, found=SimpleNamespace(breaks=broken))
         return breaks_words(told)
 
-    assert words(665.0, "pushed").startswith(": the case that breaks first, at 0.67 N/mm: at 0.39 N/mm it is felt, tho")
+    stiffer = ": the case that breaks first, at 0.67 N/mm: at 0.39 N/mm it is felt, though"
+    assert words(665.0, "pushed").startswith(stiffer)
     assert words(390.0, "pushed") == ": the case that breaks first, at 0.39 N/mm"
     assert "to the end of the quarter second" in words(390.0, "window")
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # Names a stage of so many parts; what it returns is called after each of them.
 Stage = Callable[[str, int], Callable[[], None]]
 _REFRESH_S = 0.1
-_JUDGING = "The run is over; its end is held still and pushed, to be judged. Ctrl-C leaves it unjudged."
+_JUDGING = "Over; held still and pushed, to be judged. Ctrl-C leaves it unjudged."
 # Lines of a stage where there is no terminal.
 _LINES = 10
 # Columns that all but the bar need, and the bar's bounds.

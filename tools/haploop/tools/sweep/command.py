@@ -118,6 +118,7 @@ def _run(request: Request, made: Sweep, directory: Path) -> Summary:
                     ended = "stopped"
             missing = sum(math.isnan(boundary.near) for boundary in found)
             undecided = sum(bool(boundary.why) for boundary in found) - missing
+            bounds = {"found": len(found) - missing, "undecided": undecided, "missing": missing}
             ran_s = time.monotonic() - began
             summary = {
                 "title": made.title,
@@ -132,7 +133,7 @@ def _run(request: Request, made: Sweep, directory: Path) -> Summary:
                 "counts": dict(progress.counts),
                 "first_reason": progress.reason,
                 "provisos": dict(progress.provisos),
-                **({"boundaries": _counted(len(found) - missing, undecided, missing)} if found else {}),
+                **({"boundaries": bounds} if found else {}),
                 "wall_s": before_s + ran_s,
                 "rate_1_s": progress.ran / ran_s,
                 "workers": pool.count,
@@ -144,11 +145,6 @@ def _run(request: Request, made: Sweep, directory: Path) -> Summary:
         except OSError as error:
             raise StoreError(f"{path} could not be written: {error.strerror}.") from error
     return summary
-
-
-def _counted(found: int, undecided: int, missing: int) -> dict[str, int]:
-    """Returns how many boundaries were found, over how many of these it is undecided, and how many are missing."""
-    return {"found": found, "undecided": undecided, "missing": missing}
 
 
 def _directory(request: Request, made: Sweep) -> Path:
