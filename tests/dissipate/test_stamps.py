@@ -10,6 +10,7 @@ import pytest
 
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.recording.samples import Floats
+from haploop.tools.dissipate.recording.stamps import stamps
 from haploop.tools.dissipate.recording.text_recording import Layout
 from haploop.tools.dissipate.report import doubtful, make_report, note_sentences
 from helpers.data.recordings import outcome, write
@@ -50,6 +51,14 @@ def test_even_samples_with_rounded_times_keep_their_rate_and_energy(
     assert (notes.uneven, notes.gaps, notes.bridged, notes.rounded_s) == (0, 0, 0, pytest.approx(step_s))
     assert any("The times are rounded to" in sentence for sentence in note_sentences(found))
     assert not doubtful(found)
+
+
+@pytest.mark.parametrize("begins_s", [0.0, 10.0])
+def test_rounded_times_are_recognised_in_a_recording_shorter_than_a_second(begins_s: float) -> None:
+    """0 is a multiple of every power of ten: below 1 s all times seemed to be multiples of a million."""
+    found = stamps(np.round(begins_s + 1.3e-3 * np.arange(500), 3), 1.0)
+    assert found.rounded_s == 1e-3
+    assert found.period_s == pytest.approx(1.3e-3, rel=1e-6)
 
 
 def test_a_missing_sample_and_a_gap_are_found_between_rounded_times(tmp_path: Path) -> None:

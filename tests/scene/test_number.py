@@ -30,6 +30,7 @@ from helpers.scenes.least import mistakes, scene
         ("3g", "kg", 0.003),
         ("1e1 kHz", "Hz", 10_000.0),
         ("90 deg", "rad", math.pi / 2),
+        ("90 °", "rad", math.pi / 2),
     ],
 )
 def test_text_with_a_unit_is_the_same_float_as_the_si_number_to_the_last_bit(text, unit, value):
@@ -40,6 +41,7 @@ def test_text_with_a_unit_is_the_same_float_as_the_si_number_to_the_last_bit(tex
     ("given", "sentence"),
     [
         ("2 ms", "ms is a time, but N/m is a stiffness."),
+        ("3 N/m °", "N/m ° counts angle and cannot stand for N/m."),
         ("5 Ns/mm", '"Ns/mm" is not a unit; leave a space between multiplied units.'),
         ("5", 'Text must carry a unit, such as "5 N/m"'),
         ("five N/m", 'It must be a number and its unit, such as "1 N/m" or "0.2 N/m / 4096".'),

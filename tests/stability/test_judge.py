@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from haploop.launch.stability.judge import judge
+from haploop.launch.stability.judge import judge, judge_scene
 from haploop.launch.stability.looks import is_smooth
 from haploop.protocol.scene.effects import Friction
 from helpers.runs.judged import ended, found
@@ -180,3 +181,18 @@ def test_a_scene_without_noise_is_judged_the_same_with_its_noise_off():
     plain = scene(**pressed(noise={"deviation": 1e-12, "cutoff": 100.0}))
     finding, without = found(plain), found(replace(plain, noise=None))
     assert finding.word == without.word == "steady"
+
+
+@pytest.mark.parametrize("duration", [0.45, 0.7, 1.2])
+def test_contact_anywhere_in_the_window_is_contact_for_the_verdict_too(duration: float) -> None:
+    """A device thrown at a wall leaves it early in the window, which is the second half of a shorter run."""
+    from_s = max(duration - 0.5, 0.0) if duration >= 0.5 else duration / 2.0
+    thrown = scene(
+        duration=duration, device={"mass": 0.01, "damping": 0.0, "velocity": -0.1},
+        wall={"position": -0.1 * (from_s + 0.03), "stiffness": 500.0}, run={"verdict": "pushed"},
+    )  # fmt: skip
+    summary = run_in_process(thrown, {})
+    assert summary["window"]["from_s"] == pytest.approx(from_s)
+    assert 0.8 < summary["window"]["outside_fraction"] < 1.0
+    assert summary["verdict"] != "no-contact"
+    assert judge_scene(thrown, {}).word == summary["verdict"]

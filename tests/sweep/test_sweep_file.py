@@ -296,6 +296,15 @@ def test_what_a_verdict_rests_on_is_recorded_as_text_unless_the_verdict_is_the_c
     assert "stability.provisos" not in [column.name for column in cheap.record]
 
 
+def test_what_two_ticks_of_a_run_do_not_tell_is_recorded_as_it_is_declared(tmp_path: Path) -> None:
+    record = 'record = ["stability.blown", "stability.chaotic", "stability.rate_1_s"]\n'
+    axes = '[axes]\n"wall.stiffness" = [100, 200]\n[set]\n"run.verdict" = "pushed"\n'
+    made = loaded(tmp_path, record + axes)
+    assert [column.kind for column in made.record] == ["string", "string", "bool", "float64"]
+    row = made.row(0, None, {"ended": "done", "verdict": "steady", "stability": {"blown": "rests", "chaotic": None}})
+    assert (row["stability.blown"], row["stability.chaotic"]) == ("rests", None)
+
+
 def test_all_element_kinds_can_be_swept(tmp_path: Path) -> None:
     """The keys of every kind are found, whichever the base scene holds."""
     for kind, element in KINDS.items():

@@ -31,6 +31,8 @@ from haploop.launch.stability.memory_drift import may_act
 from haploop.launch.stability.still_hand import End, StillHand, harder_hold, hold_of
 from haploop.launch.stability.swing import REST_M
 from haploop.logger.summary import Summary, finite, write_summary
+from haploop.logger.verdict.measures import window_span
+from haploop.logger.verdict.window import keep_steps
 from haploop.plant.plant import Plant
 from haploop.protocol.changes import Event, is_change
 from haploop.protocol.scene.effects import Friction
@@ -82,9 +84,9 @@ def end_of(
     if plant.stop_reason:
         return Finding("diverged", "diverged", detail=plant.stop_reason)
     rows = b"".join(block["columns"]["in_contact"] for block in controller.recorder.take())
-    return end_at(
-        scene, plant, controller, np.frombuffer(rows)[max(ticks // 2, ticks - time.control_rate // 2) :] > 0.0
-    )
+    n = time.steps_per_tick
+    window = window_span(ticks * n, keep_steps(time.plant_rate), n)
+    return end_at(scene, plant, controller, np.frombuffer(rows)[ticks - window.ticks :] > 0.0)
 
 
 def end_at(scene: Scene, plant: Plant, controller: Controller, inside: np.ndarray) -> End | Finding:

@@ -41,7 +41,7 @@ class Figures(NamedTuple):
     """The ``window`` entry of the summary.
 
     Attributes:
-        from_s: when the window begins: half a second before the end, half of a run that is shorter than a second.
+        from_s: when the window begins: half a second before the end, or half-way through a run shorter than that.
         oscillation_m: how far the true position moved in it, peak to peak.
         growth_1_s: the r of e^(r t) by which the swings grow; negative: they decay; None where nothing swings.
         outside_fraction: share of its ticks that are out of contact.

@@ -104,10 +104,11 @@ class Window:
             yield from map(RunMeasures, windows, self.extremes(some), swing_m.tolist())
 
     def contacts(self, places: np.ndarray) -> np.ndarray:
-        """Returns whether each tick of the window was in contact, shape (places, ticks); at least the last tick's."""
-        ran = self.state.steps // self._time.steps_per_tick
-        ticks = ran - max(ran // 2, ran - self._time.control_rate // 2)
-        return last_rows(self.state.rows["in_contact"], ran, places)[:, -ticks:] > 0.0
+        """Returns whether each tick of the window was in contact, shape (places, ticks)."""
+        n, rows = self._time.steps_per_tick, self.state.rows["in_contact"]
+        ticks = window_span(self.state.steps, keep_steps(self._time.plant_rate), n).ticks
+        some = last_rows(rows, self.state.steps // n, places)
+        return some[:, some.shape[1] - ticks :] > 0.0
 
     def extremes(self, places: np.ndarray) -> Iterator[Extremes]:
         s = self.state

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.result import unit_of
 from haploop.launch.spec import RunFailed
+from haploop.launch.stability.decide import Finding
 from haploop.logger.summary import OF_THE_MACHINE, Summary
 from haploop.protocol.names import nearest
 from haploop.protocol.scene.scene import Scene
@@ -53,7 +54,7 @@ def make_columns(
         else:
             complain(place, "It must be a dotted key of a run's summary.", nearest(name, known))
     wanted = dict.fromkeys([VERDICT, *names])
-    return [Column(name, _kind(known.get(name)), unit_of(name)) for name in wanted if name not in (ENDED, WHY)]
+    return [Column(name, _kind(name, known.get(name)), unit_of(name)) for name in wanted if name not in (ENDED, WHY)]
 
 
 def wants_energy(columns: Sequence[Column]) -> bool:
@@ -99,5 +100,9 @@ def _without_places(name: str) -> str:
     return ".".join("0" if part.isdecimal() else part for part in name.split("."))
 
 
-def _kind(value: Any) -> str:
+def _kind(name: str, value: Any) -> str:
+    """Returns the kind of a column by a value of it; of None, which two ticks tell of a verdict, as it is declared."""
+    if value is None:
+        declared = Finding.__annotations__.get(name.removeprefix("stability."), "")
+        return TEXT if "str" in declared else TRUTH if "bool" in declared else NUMBER
     return TRUTH if isinstance(value, bool) else TEXT if isinstance(value, str | list) else NUMBER

@@ -85,6 +85,8 @@ def _resolution(numbers: Floats) -> float:
     """Returns the power of ten of which all numbers are multiples; 0 where they have too many digits."""
     for digits in _DIGITS:
         scaled = numbers * 10.0**digits
+        if np.abs(scaled).max() < 0.5:  # 0 is a multiple of any power, and all of these are near it
+            continue
         if np.abs(scaled - np.round(scaled)).max() < _ROUNDING * max(1.0, np.abs(scaled).max() * 1e-6):
             return 10.0**-digits
     return 0.0
