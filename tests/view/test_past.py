@@ -1,6 +1,7 @@
 """Recorded runs on the page: found, opened, drawn over another, and refused by a sentence where they are not there."""
 
 import asyncio
+import json
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -101,6 +102,12 @@ def test_recorded_runs_are_listed_by_name_verdict_and_date_and_one_that_cannot_b
     (tmp_path / "runs/first/summary.json").write_text("{")
     damaged = next(past for past in runs.past() if past.id == "first")
     assert (first.title, damaged.title) == (recorded.summary["title"], "first")
+    whole = {name: value for name, value in recorded.summary.items() if name != "checksum"}
+    for odd in ({"stability": None}, {"stability": {"provisos": None}}, {"verdict": 3}, {"title": []}):
+        (tmp_path / "runs/first/summary.json").write_text(json.dumps(whole | odd))
+        assert [past.id for past in LiveRuns().past()].count("first") == 1, odd
+    (tmp_path / "runs/first/scene.toml").unlink()
+    assert [past.id for past in LiveRuns().past()] == ["second"], "what has no scene, as a sweep, is no run"
     assert next(past for past in runs.past() if past.id == "second") is second, "it is read once"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,17 +34,21 @@ class RecordedRun:
     @classmethod
     def of_summary(cls, file: Path, ended_s: float) -> RecordedRun:
         """Makes it of its summary, written at a time in s; of one that cannot be read its folder's name is told."""
+        from haploop.launch.runs.run_files import recorded_summary
         from haploop.logger.log import LogError
-        from haploop.logger.summary import read
+        from haploop.logger.summary import misfit
         from haploop.tools.render.terminal import told
 
         name, when = file.parent.name, time.strftime("%d %b %H:%M", time.localtime(ended_s))
         try:
-            summary = read(file)
+            summary = recorded_summary(file.parent) or {}
+            stability = {"provisos": [], **summary.get("stability", {})}
             word = "failed" if summary["ended"] == "failed" else told(summary)
-            words = [word, *summary.get("stability", {}).get("provisos", ()), when]
-            return cls(name, file.parent, summary.get("title") or name, ", ".join(words))
-        except (LogError, KeyError):
+            if misfit(stability, {"provisos": [str]}):
+                raise LogError(f"The verdict in {file} is not to be read.")
+            words = [word, *stability["provisos"], when]
+            return cls(name, file.parent, str(summary.get("title") or name), ", ".join(words))
+        except (LogError, KeyError, TypeError):  # somebody else's file, or of another version
             return cls(name, file.parent, name, when)
 
     def scene(self) -> Scene:
@@ -88,7 +93,14 @@ class LiveRuns:
         """Returns the recorded runs in ./runs that have a summary, the newest first; of a run elsewhere none."""
         if self._only:
             return []
-        found = sorted(((file.stat().st_mtime, file) for file in Path(_RUNS).glob("*/summary.json")), reverse=True)
+        from haploop.launch.spec import SCENE
+
+        found: list[tuple[float, Path]] = []
+        for file in Path(_RUNS).glob("*/summary.json"):  # a sweep has one, too, and no scene
+            with suppress(OSError):  # it may be deleted meanwhile
+                if (file.parent / SCENE).is_file():
+                    found.append((file.stat().st_mtime, file))
+        found.sort(reverse=True)
         now = {(file, ended_s) for ended_s, file in found[:_MOST_PAST]}
         self._recorded = {key: run for key, run in self._recorded.items() if key in now}
         for key in now - self._recorded.keys():
