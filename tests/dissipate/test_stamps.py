@@ -56,7 +56,7 @@ def test_even_samples_with_rounded_times_keep_their_rate_and_energy(
 @pytest.mark.parametrize("begins_s", [0.0, 10.0])
 def test_rounded_times_are_recognised_in_a_recording_shorter_than_a_second(begins_s: float) -> None:
     """0 is a multiple of every power of ten: below 1 s all times seemed to be multiples of a million."""
-    times: Floats = np.round(np.asarray(begins_s + 1.3e-3 * np.arange(500), float), 3)
+    times = np.asarray(np.round(begins_s + 1.3e-3 * np.arange(500), 3), float)
     found = stamps(times, 1.0)
     assert found.rounded_s == 1e-3
     assert found.period_s == pytest.approx(1.3e-3, rel=1e-6)
