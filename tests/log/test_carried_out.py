@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from haploop.launch.scene.file import load
@@ -116,3 +117,16 @@ def test_a_delay_that_is_not_set_beside_what_the_controller_did_ends_the_run() -
     seen.add_motion({"from_tick": 0, "columns": {"command": held}})
     with pytest.raises(NodeError, match=r"clock.round_trip_delay = 0.003.* was refused: .* so the run cannot go on"):
         seen.judge(300)
+
+
+def test_a_delay_longer_than_half_the_window_holds_nobody_however_few_ticks_a_block_has() -> None:
+    """Of 1000 steps a tick a block takes 65 ticks, whatever the scene asks for."""
+    of = scene(duration=1.0, clock={"plant_rate": 1_000_000}, run={"block_ticks": 1000})
+    time = Timebase.from_scene(of)
+    half = time.window_ticks(of.run) // 2
+    for delay_ticks, stands_at in ((half, 100), (half + 1, 150)):
+        seen = CarriedOut(of, time, ["plant"])
+        seen.note(100, {"set": {DELAY: delay_ticks / 1000}})
+        seen.add_motion({"from_tick": 0, "columns": {"command": np.zeros(150 * 1000 + 1).tobytes()}})
+        assert seen.judge(150) == []
+        assert (half, seen.tick) == (65, stands_at)

@@ -11,6 +11,7 @@ from haploop.controller.dissipation.registry import load_source
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.layers import Layers
+from haploop.protocol.plugin_file import PluginError
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cli import scenes
 from haploop.tools.executor.work import Work
@@ -79,3 +80,17 @@ def test_what_an_element_prints_is_not_heard_again_where_its_run_is_judged_or_re
 def test_an_element_without_a_docstring_is_not_described_by_its_signature():
     silent = type("Silent", (Element,), {"kind": "silent", "force": lambda self, motion: 0.0})
     assert silent.__doc__ is None
+
+
+@pytest.mark.parametrize("kind", ["damping-2", "a.b", "", "two words", "wall", "none", "earlier", "a\nb"])
+def test_a_kind_by_which_books_could_not_be_told_apart_is_refused(kind):
+    """Books of a second damping are called damping-2, and an account's sides are told after a dot."""
+    source = f"from haploop.controller.dissipation import Element\n\nclass One(Element):\n    kind = {kind!r}\n\n"
+    with pytest.raises(PluginError, match=r"kind of One in one\.py is .* its books are called by it"):
+        load_source(source + "    def force(self, motion):\n        return 0.0\n", "one.py")
+
+
+@pytest.mark.parametrize("kind", ["damping-2b", "x2", "my_own-element", "dämpfer"])
+def test_a_kind_of_letters_digits_and_dashes_is_taken(kind):
+    source = f"from haploop.controller.dissipation import Element\n\nclass One(Element):\n    kind = {kind!r}\n\n"
+    assert load_source(source + "    def force(self, motion):\n        return 0.0\n", "one.py").keys() == {kind}

@@ -56,7 +56,7 @@ class Sim:
         self.shown: list[tuple[str, str]] = []
         self.second_logs: list[tuple[Path, dict[str, Any], bool]] = []
         self.world = World(plan.seed, plan.jumpiness, plan.latency_s)
-        self.watch = Watch(self.scene.run.window_blocks * self.scene.run.block_ticks)
+        self.watch = Watch(self.time.window_ticks(self.scene.run))
         self.run = SimRun(self.world, self.watch, Disk(), dict(plan.starts_s))
         self.visitors: list[Process] = []
         self.killed_at: dict[str, float] = {}

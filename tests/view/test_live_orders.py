@@ -2,10 +2,13 @@
 
 import asyncio
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from haploop.protocol.transport.clock_client import Aborted
+from haploop.tools.cli.live_runs import LiveRuns
 from helpers.live.followed import follow, has_logged, same, stands, whole
 
 
@@ -102,3 +105,37 @@ def test_what_is_refused_comes_back_as_a_sentence_and_changes_nothing(tmp_path):
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["ended"] == "done"
     assert [element["kind"] for element in summary["energy"]["elements"]] == ["unidirectional-inertia"]
+
+
+class Vanishing(LiveRuns):
+    """The live runs, and one beside them that is gone as soon as somebody knocks."""
+
+    def __init__(self):
+        super().__init__()
+        self.other = []
+
+    def appear(self):
+        self.other = [SimpleNamespace(id="other", title="short", is_here=True, make_context=self.vanish)]
+
+    def vanish(self):
+        self.other = []
+        raise Aborted
+
+    def live(self):
+        return [*super().live(), *self.other]
+
+
+def test_where_an_opened_run_has_gone_that_is_said_and_the_one_before_is_followed_on(tmp_path):
+    runs = Vanishing()
+
+    async def play(run, tab, here):
+        await tab.phase("paused")
+        runs.appear()
+        ok, text = await tab.ask("open", run="other")
+        assert (ok, text) == (False, 'Run other, "short", ended before its first tick; its terminal says why.')
+        assert (await tab.ask("step", ticks=50))[0]
+        await tab.until("the step", lambda: tab.state["phase"] == "paused" and tab.state["tick"] >= 250)
+        await tab.ask("resume")
+        await tab.phase("ended")
+
+    follow(play, tmp_path, "duration=0.3", "wall.position=-0.001", pauses=(200,), options={"runs": runs})

@@ -142,13 +142,16 @@ def test_a_page_that_stays_with_its_run_takes_up_another_only_where_it_is_chosen
     async def play():
         runs = Live("other", "own")
         viewer = Viewer(runs, "own", from_start=True, stays=True)
-        assert (await viewer._next_run()).id == "own"
+        assert (await viewer._next_run())[0].id == "own"
         runs.names = ["other", "new"]
         with pytest.raises(TimeoutError):
             await asyncio.wait_for(viewer._next_run(), 0.5)
         assert viewer.listing()["stays"]
-        await viewer.open("other")
-        assert (await viewer._next_run()).id == "other"
+        opening = asyncio.create_task(viewer.open("other"))
+        run, joined = await viewer._next_run()
+        assert run.id == "other"
+        joined.set_result(True)
+        assert await opening == "Run other is shown."
 
     to_its_end(play())
 
@@ -157,7 +160,7 @@ def test_of_a_run_that_ended_before_its_first_tick_the_page_says_so():
     async def play():
         runs = Live("own")
         viewer = Viewer(runs, None, from_start=True)
-        own = await viewer._next_run()
+        own, _ = await viewer._next_run()
         runs.names = []
         assert await viewer._join(own) is None
         runs.names = ["later"]

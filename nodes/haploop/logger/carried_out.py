@@ -46,7 +46,7 @@ class CarriedOut:
         self._looked = 0
         # What is late or lost on the way acts at other steps than the delay's.
         is_told = "plant" in foreign and not (scene.jitter or scene.loss)
-        self._delays = Delays(time, scene.run.window_blocks * scene.run.block_ticks // 2) if is_told else None
+        self._delays = Delays(time, time.window_ticks(scene.run) // 2) if is_told else None
 
     @property
     def tick(self) -> int | float:

@@ -24,8 +24,11 @@ _LOOK_S, _IDLE_TURN_S = 0.2, 0.05
 _LOOKS = 10
 # The log is written at least so often: after this time it holds what was received before.
 _LOGGED_S = 0.6
+_NOT_BEGUN = 'Run {}, "{}", ended before its first tick; its terminal says why.'
 # Pages look at so many parts of a run at once, without making one twice.
 _MOST_MADE = 4
+# An answer to whoever opens a live run waits so long for it to let the viewer in.
+_JOIN_S = 1.0
 # Runs to choose from are looked for so often.
 _LIST_S = 2.0
 
@@ -47,6 +50,7 @@ class Viewer:
     def __init__(self, runs: Runs, first: str | None, from_start: bool, stays: bool = False) -> None:
         self._runs, self._first, self._from_start, self._stays = runs, first, from_start, stays
         self._known: set[str] = set()
+        self._opened: tuple[Run, asyncio.Future[bool]] | None = None
         self._updated = asyncio.Event()
         self.session: RunSession | None = None
         self.overlay: RunSession | None = None
@@ -81,11 +85,13 @@ class Viewer:
 
     async def follow_runs(self) -> None:
         while True:
-            run = await self._next_run()
+            run, joined = await self._next_run()
             session = await self._join(run)
+            if not joined.done():
+                joined.set_result(session is not None)
             if session is None:
-                self.why = f'Run {run.id}, "{run.title}", ended before its first tick; its terminal says why.'
-                self._stays = False  # there is nothing to stay with
+                self.why = _NOT_BEGUN.format(run.id, run.title)
+                self._go_back(run)
                 continue
             self.session = self._followed = session
             tasks = [asyncio.create_task(session.clock.keep_asking())]
@@ -94,11 +100,20 @@ class Viewer:
             try:
                 await self._receive(session)
             finally:
-                for task in tasks:
-                    task.cancel()
+                await _end(tasks)
                 await asyncio.to_thread(session.close)
-            if not self._first:
+            if not self._opened:
                 await self._complete(session)
+
+    def _go_back(self, gone: Run) -> None:
+        """Follows again what was left, still live, for a run that is gone."""
+        left = self._followed
+        if left is None or left.outcome:
+            self._stays = False  # there is nothing to stay with
+        elif left.run.id == gone.id:
+            left.end("ended", "")
+        else:
+            self._opened = left.run, asyncio.get_running_loop().create_future()
 
     def listing(self) -> Message:
         """Returns the live runs, the recorded ones, and which are on show, looked for now and then.
@@ -130,12 +145,20 @@ class Viewer:
         return found[0] if found else session.run.id
 
     async def open(self, run_id: str) -> str:
-        """Puts a live or a recorded run on show, for all pages; raises CommandFailed where there is none of that id."""
+        """Puts a live or a recorded run on show, for all pages.
+
+        Raises:
+            CommandFailed: there is none of that id, or it was gone before it could be joined.
+        """
         if self._followed and self._listed_as(self._followed) == run_id:
             self.session = self._followed
-        elif run_id in [run.id for run in self._runs.live()]:
-            self._known.discard(run_id)
-            self._first = run_id
+        elif run := next((run for run in self._runs.live() if run.id == run_id), None):
+            self._opened = run, (joined := asyncio.get_running_loop().create_future())
+            await asyncio.wait([joined], timeout=_JOIN_S)
+            if not joined.done():
+                return f"Run {run_id} is shown as soon as it begins."
+            if not joined.result():
+                raise CommandFailed(_NOT_BEGUN.format(run_id, run.title))
         else:
             self.session = await self._read(run_id)
         return f"Run {run_id} is shown."
@@ -158,15 +181,21 @@ class Viewer:
         except (OSError, LogError, ValueError) as error:
             raise CommandFailed(f"Run {run_id} cannot be read: {error}") from error
 
-    async def _next_run(self) -> Run:
-        """Waits for the run that was asked for first, or the newest of those that were not there at the last choice."""
+    async def _next_run(self) -> tuple[Run, asyncio.Future[bool]]:
+        """Waits for a run to follow; returns it, and who is to be told whether it could be joined.
+
+        It is the one that was opened or asked for first, or the newest of those that were not there at the last choice.
+        """
         while True:
             live = self._runs.live()
+            if self._opened:
+                opened, self._opened, self._known = self._opened, None, {run.id for run in live}
+                return opened
             fresh = self._fresh(live)
             asked_for = [run for run in fresh if self._first and run.id.startswith(self._first)]
             if fresh:
                 self._known, self._first = {run.id for run in live}, None
-                return [*fresh, *asked_for][-1]
+                return [*fresh, *asked_for][-1], asyncio.get_running_loop().create_future()
             await self._idle(_LOOK_S)
 
     def _fresh(self, live: Sequence[Run]) -> list[Run]:
@@ -194,7 +223,7 @@ class Viewer:
 
     async def _receive(self, session: RunSession) -> None:
         due = gone_due = wall_clock.monotonic()
-        while not session.outcome and not self._first:
+        while not session.outcome and not self._opened:
             session.poll()
             self._notify_pages()
             now = wall_clock.monotonic()
@@ -218,7 +247,7 @@ class Viewer:
             session.read_summary()
         if self._from_start and not session.is_complete:
             await self._backfill(session)
-        while session.verdict_is in ("awaited", "abandoned") and not self._fresh(self._runs.live()):
+        while session.verdict_is in ("awaited", "abandoned") and not (self._opened or self._fresh(self._runs.live())):
             session.given_up = not self._runs.has_launcher(session.run)
             session.read_summary()
             await self._idle(_LOOK_S)
@@ -241,3 +270,13 @@ class Viewer:
             if over or backfill.reaches(session.history):
                 session.prepend(backfill.history)
                 return
+
+
+async def _end(tasks: Sequence[asyncio.Task[None]]) -> None:
+    """Cancels tasks that work beside the one that draws; what one of them raised is reported, and nothing else ends."""
+    for task in tasks:
+        task.cancel()
+    for error in await asyncio.gather(*tasks, return_exceptions=True):
+        if isinstance(error, Exception):
+            loop = asyncio.get_running_loop()
+            loop.call_exception_handler({"message": "A task beside the page has failed.", "exception": error})

@@ -110,6 +110,10 @@ class Timebase:
         """Returns the most ticks in a block: ``run.block_ticks``, or fewer where they would hold too many steps."""
         return min(run.block_ticks, _MOST_STEPS_IN_A_BLOCK // self.steps_per_tick)
 
+    def window_ticks(self, run: Run) -> int:
+        """Returns how many ticks the clock grants ahead of the slowest lossless node: ``run.window_blocks`` blocks."""
+        return run.window_blocks * self.block_ticks(run)
+
     def tick_ns(self, tick: int) -> int:
         """Returns the time of a tick in whole nanoseconds, rounded down."""
         return tick * 1_000_000_000 // self.control_rate

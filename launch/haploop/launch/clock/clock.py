@@ -57,7 +57,7 @@ class Clock:
     ) -> None:
         self._scene = scene
         self._time, self._kinds = time, kinds
-        self._window = scene.run.window_blocks * time.block_ticks(scene.run)
+        self._window = time.window_ticks(scene.run)
         self._leap = self._window // 4 if in_leaps else 1
         self.until = 0
         self.end = time.ticks

@@ -8,7 +8,7 @@ import pickle
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from haploop.controller.dissipation import Element, ElementError, registry
@@ -19,10 +19,13 @@ from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import Scene
 
 _DIED = "The process that judged it ended with status {}."
+_HANGS = "The code of its plugins did not come back within {:g} s as it was judged."
+# An exchange may take so many times the silence that a run endures in a node: nobody waits for its forces.
+_PATIENCE = 4.0
 
 
 def judge_elsewhere(scene: Scene, plugins: Sequence[Path], events: list[tuple[int, Event]]) -> Finding:
-    """Returns the finding of a run with these plugin files and events; undecided where its process dies."""
+    """Returns the finding of a run with these plugin files and events; undecided where its process dies or hangs."""
     judging = subprocess.Popen(
         [sys.executable, "-m", "haploop.launch.runs.judging"],
         stdin=subprocess.PIPE,
@@ -35,28 +38,45 @@ def judge_elsewhere(scene: Scene, plugins: Sequence[Path], events: list[tuple[in
     finally:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(judging.pid, signal.SIGKILL)
+    if judging.returncode == -signal.SIGALRM:
+        return Finding("undecided", "failed", detail=_HANGS.format(_patience_s(scene)))
     if judging.returncode or not answer:
         return Finding("undecided", "failed", detail=_DIED.format(judging.returncode))
     return pickle.loads(answer)
 
 
-def find(scene: Scene, kinds: Mapping[str, type[Element]], events: list[tuple[int, Event]]) -> Finding:
+def _patience_s(scene: Scene) -> float:
+    return _PATIENCE * scene.run.deadline
+
+
+def find(
+    scene: Scene,
+    kinds: Mapping[str, type[Element]],
+    events: list[tuple[int, Event]],
+    on_exchange: Callable[[], object] = lambda: None,
+) -> Finding:
     """Judges a run here, with the code of these kinds; undecided where it fails."""
     try:
-        return judge_scene(scene, kinds, events, LOOKS_S, frictionless=True)
+        return judge_scene(scene, kinds, events, LOOKS_S, frictionless=True, on_exchange=on_exchange)
     except (ElementError, ArithmeticError) as error:
         return Finding("undecided", "failed", detail=str(error))
 
 
 def main() -> None:
-    """Reads what is to be judged on stdin, writes the finding on what was stdout; what plugins print goes nowhere."""
-    scene, plugins, events = pickle.load(sys.stdin.buffer)
+    """Reads what is to be judged on stdin, writes the finding on what was stdout; what plugins print goes nowhere.
+
+    SIGALRM ends the process where an exchange takes too long, whatever the code of a plugin does.
+    """
+    given, plugins, events = pickle.load(sys.stdin.buffer)
+    scene = Scene.from_dict(given)
     with os.fdopen(os.dup(1), "wb") as answers:
         nowhere = os.open(os.devnull, os.O_RDWR)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 0)
         kinds = registry(plugins)
-        pickle.dump(find(Scene.from_dict(scene), kinds, events), answers)
+        finding = find(scene, kinds, events, lambda: signal.setitimer(signal.ITIMER_REAL, _patience_s(scene)))
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        pickle.dump(finding, answers)
 
 
 if __name__ == "__main__":

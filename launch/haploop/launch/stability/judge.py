@@ -48,6 +48,7 @@ def judge_scene(
     *,
     blows: Sequence[float] = BLOWS,
     frictionless: bool = False,
+    on_exchange: Callable[[], object] = lambda: None,
 ) -> Finding:
     """Runs a resolved scene to its end and judges that end.
 
@@ -58,17 +59,21 @@ def judge_scene(
         looks_s: times since the push at which the loop is looked at until it tells.
         blows: what one that rests is struck with, as shares of its push.
         frictionless: whether one that rests is pushed without its friction, too.
+        on_exchange: called whenever the plant asks for commands.
 
     Raises:
         ElementError: an element raised.
         ArithmeticError: the plant's arithmetic failed.
     """
-    end = end_of(scene, kinds, events)
+    end = end_of(scene, kinds, events, on_exchange)
     return judge(end, looks_s, blows=blows, frictionless=frictionless) if isinstance(end, End) else end
 
 
 def end_of(
-    scene: Scene, kinds: Mapping[str, type[Element]], events: Sequence[tuple[int, Event]] | None = None
+    scene: Scene,
+    kinds: Mapping[str, type[Element]],
+    events: Sequence[tuple[int, Event]] | None = None,
+    on_exchange: Callable[[], object] = lambda: None,
 ) -> End | Finding:
     """Returns the end of a run, or what is found of one that diverged or ended out of contact."""
     time = Timebase.from_scene(scene)
@@ -79,30 +84,42 @@ def end_of(
             plant.schedule(tick, event)
         elif event.get("stop"):
             ticks = min(ticks, tick)
-    plant.run_until(ticks, lambda _, samples: [float(force) for force in controller.answer(samples)])
+
+    def exchange(_: int, samples: list[tuple[float, ...]]) -> list[float]:
+        on_exchange()
+        return [float(force) for force in controller.answer(samples)]
+
+    plant.run_until(ticks, exchange)
     plant.take_block()
     if plant.stop_reason:
         return Finding("diverged", "diverged", detail=plant.stop_reason)
     rows = b"".join(block["columns"]["in_contact"] for block in controller.recorder.take())
     n = time.steps_per_tick
     window = window_span(ticks * n, keep_steps(time.plant_rate), n)
-    return end_at(scene, plant, controller, np.frombuffer(rows)[ticks - window.ticks :] > 0.0)
+    return end_at(scene, plant, controller, np.frombuffer(rows)[ticks - window.ticks :] > 0.0, on_exchange)
 
 
-def end_at(scene: Scene, plant: Plant, controller: Controller, inside: np.ndarray) -> End | Finding:
+def end_at(
+    scene: Scene,
+    plant: Plant,
+    controller: Controller,
+    inside: np.ndarray,
+    on_exchange: Callable[[], object] = lambda: None,
+) -> End | Finding:
     """Returns the end of a run whose blocks have been taken.
 
     Args:
         scene: what was run.
         plant, controller: as they stand there.
         inside: whether each of the last ticks was in contact, shape (ticks,).
+        on_exchange: called whenever a plant that goes on from there asks for commands.
     """
     if plant.stop_reason:
         return Finding("diverged", "diverged", detail=plant.stop_reason)
     if not inside.any():
         return Finding("no-contact", "no contact")
     time = Timebase.from_scene(scene)
-    return End(scene, time, plant, controller, hold_of(scene, time, plant.reached, inside))
+    return End(scene, time, plant, controller, hold_of(scene, time, plant.reached, inside), on_exchange)
 
 
 def is_watched(scene: Scene, summary: Summary) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass, replace
 
@@ -34,6 +35,7 @@ class End:
         scene, time: what was run, and its integers.
         plant, controller: as they stand there, their blocks taken.
         hold_N: the force at which the hand is held from there on.
+        on_exchange: called whenever a plant that goes on from there asks for commands.
     """
 
     scene: Scene
@@ -41,6 +43,7 @@ class End:
     plant: Plant
     controller: Controller
     hold_N: float
+    on_exchange: Callable[[], object] = lambda: None
 
     @property
     def wall_m(self) -> float:
@@ -69,6 +72,7 @@ class StillHand:
         self._then: Scene | None = held(end.scene, end.hold_N)
         self.x, self.command = np.zeros(0), np.zeros(0)
         self._memory: list[tuple[float, np.ndarray]] = []
+        self._on_exchange = end.on_exchange
 
     @property
     def stop_reason(self) -> str | None:
@@ -100,6 +104,7 @@ class StillHand:
         commands: list[float] = []
 
         def exchange(_: int, samples: list[tuple[float, ...]]) -> list[float]:
+            self._on_exchange()
             forces = [float(force) for force in self._controller.answer(samples)]
             commands.extend(forces)
             return forces

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Mapping
 from dataclasses import MISSING
 from pathlib import Path
@@ -12,6 +13,10 @@ from haploop.controller.dissipation.element import ASKABLE, Element
 from haploop.protocol.installed import Brought, entry_points_of, not_loaded
 from haploop.protocol.plugin_file import ELEMENTS, PluginError, bring_file, bring_source
 from haploop.protocol.quantity import Quantity
+
+# Books are called by the kind, numbered from the second one of a kind on; a dot ends the name of an account.
+_KIND = re.compile(r"(?!.*-\d+$)\w[\w-]*")
+_TAKEN = ("wall", "earlier", "none")
 
 
 def installed() -> dict[str, str]:
@@ -71,6 +76,12 @@ def checked(element: object, origin: str) -> type[Element]:
         raise PluginError(f"{origin} must name a class derived from Element, but gives {element!r}.")
     if not isinstance(getattr(element, "kind", None), str):
         raise PluginError(f'{element.__name__} in {origin} names no kind; write kind = "my-element" in the class.')
+    if not _KIND.fullmatch(element.kind) or element.kind in _TAKEN:
+        raise PluginError(
+            f"The kind of {element.__name__} in {origin} is {element.kind!r}, but its books are called by it: it must "
+            "be letters, digits, _ and - alone, not end in a dash and a number, as the books of a second element do, "
+            f"and be none of {', '.join(_TAKEN)}."
+        )
     if inspect.isabstract(element):
         raise PluginError(f"{element.__name__} in {origin} has no method force(self, motion).")
     if unknown := [name for name in element.asks if name not in ASKABLE]:

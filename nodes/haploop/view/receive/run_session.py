@@ -54,8 +54,7 @@ class RunSession:
             raise
         welcome = self._observer.welcome
         time, scene = Timebase(**welcome["timebase"]), Scene.from_dict(welcome["scene"])
-        window = scene.run.window_blocks * scene.run.block_ticks
-        history = History(time, max(0, welcome["granted"] - window))
+        history = History(time, max(0, welcome["granted"] - time.window_ticks(scene.run)))
         self._begin(scene, time, Path(welcome["context"]["out"]), history)
         self.clock = ClockAnswers(runs, run, self.events, self.scene)
 
