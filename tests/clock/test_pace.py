@@ -135,6 +135,16 @@ def test_a_tick_is_late_by_when_it_was_done_not_by_when_it_was_granted() -> None
     assert said["most_s"] == pytest.approx(0.5)
 
 
+def test_ticks_granted_at_one_pace_are_late_by_it_though_another_was_set_before_they_were_done() -> None:
+    subject = Pace(1000, 0.1)
+    subject.grant(0, TICKS, 10.0)
+    granted = subject.grant(1, TICKS, 10.02)
+    subject.set(100.0)
+    subject.done(granted, 10.02)
+    assert granted == 3
+    assert subject.lateness()["most_s"] == pytest.approx(0.02)  # of the first; the others were due at 10.01 and 10.02
+
+
 def test_a_run_without_a_pace_tells_no_lateness() -> None:
     subject = clock()
     granted(subject, 0)

@@ -8,9 +8,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from haploop.logger.log.channels import Channels
+from haploop.logger.log.recording import MemoryLog
 from haploop.plant.line.delay import DelayLine
 from haploop.protocol.scene.scene import Clock
-from haploop.protocol.ticks import Timebase
+from haploop.protocol.ticks import Timebase, whole_count
 
 RATE, CONTROL = 10_000, 1_000
 FAR = 100_000_000  # steps: 10 000 s
@@ -49,3 +51,20 @@ def test_the_line_delays_the_two_hundred_thousandth_command_as_it_does_the_first
         line.receive([float(tick + 1)])
         line.holds(tick)
     assert line.holds(199_999) == [(3, 199_997.0, 199_997), (7, 199_998.0, 199_998)]
+
+
+@pytest.mark.parametrize("tick", [0, 12_345, 9_300_000_000, 10**10 - 2])
+def test_the_log_stamps_every_tick_that_a_run_may_have_with_its_whole_nanoseconds(tick):
+    """Ticks times 10^9 pass 2^63 from 9.2 10^9 ticks on."""
+    time, log = Timebase.from_clock(Clock(control_rate=3_000, plant_rate=30_000), 1.0), MemoryLog()
+    kept = []
+    log.write = lambda channel, log_times_ns, values: kept.extend(log_times_ns.tolist())
+    Channels(log, time, every_step=False).energy(tick, {"wall": np.zeros(2)})
+    assert kept == [time.tick_ns(tick), time.tick_ns(tick + 1)]
+
+
+def test_of_a_delay_that_is_no_whole_number_of_steps_no_plant_rate_is_offered_that_a_scene_may_not_have():
+    for rate, offered in ((2_000_000, " With clock.plant_rate = 4000000 it is 1 of them."), (6_000_000, "")):
+        complaints = []
+        whole_count(0.5 / rate, rate, "It", "plant steps", complaints)
+        assert complaints[0].endswith(f"nearest legal values are 0 s and {1 / rate:.9g} s.{offered}")

@@ -286,6 +286,14 @@ def test_what_is_recorded_may_come_from_any_corner_of_the_grid(tmp_path: Path) -
     assert made.record[1].unit == "J"
 
 
+def test_what_is_recorded_may_be_of_an_element_that_an_event_brings(tmp_path: Path) -> None:
+    text = 'record = ["energy.elements.0.true_J"]\n[axes]\n"wall.stiffness" = [100, 200]\n[set]\ndissipation = []\n'
+    swap = 'event = [{ at = 0.02, swap = { kind = "damping", damping = 1 }, element = 0 }]\n'
+    with pytest.raises(SceneError, match="dotted key of a run's summary"):
+        loaded(tmp_path, text)
+    assert [column.name for column in loaded(tmp_path, text + swap).record] == ["verdict", "energy.elements.0.true_J"]
+
+
 def test_what_a_verdict_rests_on_is_recorded_as_text_unless_the_verdict_is_the_cheap_one(tmp_path: Path) -> None:
     axes = '[axes]\n"wall.stiffness" = [100, 200]\n'
     pushed = loaded(tmp_path, '[set]\n"run.verdict" = "pushed"\n' + axes)

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
-from haploop.protocol.scene.scene import Clock, Run, Scene
+from haploop.protocol.scene.scene import MOST_RATE_HZ, Clock, Run, Scene
 
 # Decimal fractions such as 0.0003 s are not exact in binary; a whole number of steps is accepted within this.
 _WHOLE_WITHIN = 1e-6
@@ -161,11 +161,11 @@ _MOST_TIMES = 100
 
 
 def _whole_at(seconds: float, rate: int) -> str:
-    """Returns a sentence with the least multiple of a plant rate at which a time is whole steps; "" where none is."""
-    for times in range(2, _MOST_TIMES + 1):
+    """Returns a sentence with the least multiple of a plant rate at which a time is whole steps; "" where none may be."""
+    for times in range(2, min(_MOST_TIMES, MOST_RATE_HZ // rate) + 1):
         count = seconds * rate * times
         if abs(count - round(count)) <= _WHOLE_WITHIN:
-            return f" With clock.plant_rate = {rate * times} it is {round(count)} whole steps."
+            return f" With clock.plant_rate = {rate * times} it is {round(count)} of them."
     return ""
 
 

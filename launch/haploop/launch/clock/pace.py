@@ -61,7 +61,7 @@ class Pace:
         self.lost_s = 0.0
         self._late: Counter[int] = Counter()
         self._most_s, self._too_late = 0.0, 0
-        self._awaited: deque[tuple[int, int, float]] = deque()
+        self._awaited: deque[tuple[int, int, float, float]] = deque()
         self.set(rate)
 
     def set(self, rate: float) -> None:
@@ -102,7 +102,7 @@ class Pace:
             self.lost_s += surplus * self._period_s
         granted = max(until, min(limit, until + self.most_at_once, allowed))
         if granted > until:
-            self._awaited.append((until, granted, due))
+            self._awaited.append((until, granted, due, self._period_s))
         return granted
 
     def wait_s(self, until: int, now: float) -> float:
@@ -114,13 +114,13 @@ class Pace:
     def done(self, tick: int, now: float) -> None:
         """Notes that every tick before ``tick`` is done at wall time ``now``."""
         while self._awaited and self._awaited[0][0] < tick:
-            first, end, due = self._awaited.popleft()
-            for late_s in (now - due - place * self._period_s for place in range(min(end, tick) - first)):
+            first, end, due, period_s = self._awaited.popleft()
+            for late_s in (now - due - place * period_s for place in range(min(end, tick) - first)):
                 self._late[max(0, math.ceil(math.log(max(late_s, _FINEST_S) / _FINEST_S, _FACTOR)))] += 1
                 self._most_s = max(self._most_s, late_s)
                 self._too_late += late_s > self._late_s
             if end > tick:
-                self._awaited.appendleft((tick, end, due + (tick - first) * self._period_s))
+                self._awaited.appendleft((tick, end, due + (tick - first) * period_s, period_s))
 
     def lateness(self) -> dict[str, Any]:
         """Returns how late the ticks were done, by keys of ``LATENESS``; {} where none was to keep a pace."""

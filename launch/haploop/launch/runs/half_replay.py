@@ -93,19 +93,18 @@ def beside_own(
     if role == "plant":
         if hand_is_unmodelled(scene):
             return ""
-        topic, name, own = (
-            ("/plant" if "/plant" in recorded else "/controller"),
-            "x",
-            repeat_plant(scene, made, recorded)[0],
-        )
+        topic, name = "/plant" if "/plant" in recorded else "/controller", "x"
+        own = repeat_plant(scene, made, recorded)[0]
     else:
         if accelerometer_is_used(scene) and not holds_readings(scene):
             return ""
         topic, name, own = "/controller", "total", repeat_controller(scene, kinds, made, recorded)
     theirs, ours = recorded[topic][name], own[topic][name]
     count = min(len(theirs), len(ours))
+    theirs, ours = theirs[:count], ours[:count]
+    is_same = (theirs == ours) | (np.isnan(theirs) & np.isnan(ours))
     with np.errstate(invalid="ignore"):
-        apart = np.nan_to_num(np.abs(theirs[:count] - ours[:count]), nan=np.inf)
+        apart = np.where(is_same, 0.0, np.nan_to_num(np.abs(theirs - ours), nan=np.inf))
     if not apart.any():
         return _SAME.format(role)
     most, first = float(apart.max()), float(recorded[topic]["timestamp"][np.argmax(apart != 0.0)])

@@ -77,7 +77,8 @@ class Channels:
         self._events = log.channel("/events", {}, title="what changed the run, at its tick")
 
     def _log_times_ns(self, first: int, ticks: int) -> NDArray[np.int64]:
-        return np.arange(first, first + ticks, dtype=np.int64) * 1_000_000_000 // self._time.control_rate
+        seconds, rest = np.divmod(np.arange(first, first + ticks, dtype=np.int64), self._time.control_rate)
+        return seconds * 1_000_000_000 + rest * 1_000_000_000 // self._time.control_rate
 
     def plant(self, first: int, ticks: int, columns: dict[str, np.ndarray]) -> None:
         """Writes one message a tick, an array of its steps; ``columns`` are ``motion_columns`` of whole intervals."""

@@ -1,4 +1,4 @@
-"""Access control: the browser of this machine alone may look, and steer only with the link that was printed.
+"""Access control: programs of this machine alone may look, whoever runs them, and steer only with the printed link.
 
 A page from elsewhere reaches a server on loopback too, through the browser of whoever visits it. It can make that
 browser send requests, but not with another Host (its own name may resolve to this machine: DNS rebinding), not with

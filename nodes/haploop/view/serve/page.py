@@ -2,7 +2,7 @@
 
 At most four snapshots are on their way to a page that has not said yet that it drew them: a slow or hidden one costs
 nothing, and one whose answers take as long as four pictures, as beside a run that wants every core, still gets each.
-What stands beside the charts over time comes with every second one, and with the last: nobody reads it more often.
+What stands beside the charts over time comes with one in three, and with the last: nobody reads it more often.
 """
 
 from __future__ import annotations

@@ -67,8 +67,10 @@ def make_app(viewer: Viewer, guard: Guard, heard: Heard, on_closed: Callable[[],
         if connection := page.get_extra_info("socket"):
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING_BYTES)
         pages.add(page)
-        await Page(page, viewer, guard).run()
-        pages.discard(page)
+        try:
+            await Page(page, viewer, guard).run()
+        finally:
+            pages.discard(page)
         if on_closed and not pages:
             await asyncio.sleep(_ANEW_S)
             if not pages:

@@ -13,17 +13,17 @@ from haploop.protocol.scene.table import OpenTable, Table, Tables
 
 # Light takes 2.6 s to the moon and back; what is later is no answer to a hand.
 LONGEST_DELAY_S = 10.0
-_RATE = {"at_least": 1, "at_most": 10**7}
+MOST_RATE_HZ = 10**7
 
 
 class Clock(Table):
     """Rates, delay and what moves the plant; the plant rate is a whole multiple of the control rate."""
 
-    plant_rate: Annotated[int, si("Hz", "steps of the plant per second", whole=True, at_least=1, at_most=10**7)] = (
-        10_000
-    )
+    plant_rate: Annotated[
+        int, si("Hz", "steps of the plant per second", whole=True, at_least=1, at_most=MOST_RATE_HZ)
+    ] = 10_000
     control_rate: Annotated[
-        int, si("Hz", "ticks of the controller per second", whole=True, at_least=1, at_most=10**7)
+        int, si("Hz", "ticks of the controller per second", whole=True, at_least=1, at_most=MOST_RATE_HZ)
     ] = 1_000
     round_trip_delay: Annotated[
         float, si("s", "from a sample to the force that answers it", at_least=0, at_most=LONGEST_DELAY_S)

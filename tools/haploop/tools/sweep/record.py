@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.result import unit_of
+from haploop.launch.scene.events import scene_events
 from haploop.launch.spec import RunFailed
 from haploop.launch.stability.decide import Finding
 from haploop.logger.summary import OF_THE_MACHINE, Summary
+from haploop.protocol.changes import at_work, changes_of
 from haploop.protocol.names import nearest
 from haploop.protocol.scene.scene import Scene
+from haploop.protocol.ticks import Timebase
 from haploop.tools.sweep.table import ENDED, NUMBER, PROVISOS, TEXT, TRUTH, WHY, Column
 
 if TYPE_CHECKING:
@@ -68,11 +71,17 @@ def wants_trajectories(columns: Sequence[Column]) -> bool:
 
 
 def _samples(sweep: Sweep) -> list[Scene]:
-    """Returns the scenes of the corners of the grid; the base where none of them can be run."""
+    """Returns the scenes of the corners of the grid, as they begin and as their events leave them.
+
+    It is the base where none of them can be run.
+    """
     found: list[Scene] = []
     for cell in (0, sweep.count - 1):
         with suppress(Exception):  # it will be a row with its reason
-            found.append(sweep.scene(cell))
+            found.append(scene := sweep.scene(cell))
+            if scene.event:
+                changes = changes_of(scene_events(scene, Timebase.from_scene(scene)))
+                found.append(at_work(replace(scene, event=()), changes))
     return found or [sweep.base]
 
 
