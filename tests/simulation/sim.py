@@ -13,6 +13,7 @@ from haploop.launch.processes.supervisor import run_processes
 from haploop.launch.spec import OutputError, RunFailed, RunSpec, make_output
 from haploop.logger.log import LogError
 from haploop.protocol.changes import Event
+from haploop.protocol.ticks import Timebase
 from helpers.scenes.least import KINDS
 from simulation.computer.machine import Disk, SimRun
 from simulation.computer.world import Process, Stuck, World
@@ -56,7 +57,7 @@ class Sim:
         self.shown: list[tuple[str, str]] = []
         self.second_logs: list[tuple[Path, dict[str, Any], bool]] = []
         self.world = World(plan.seed, plan.jumpiness, plan.latency_s)
-        self.watch = Watch(self.time.window_ticks(self.scene.run))
+        self.watch = Watch(Timebase.from_scene(self.scene).window_ticks(self.scene.run))
         self.run = SimRun(self.world, self.watch, Disk(), dict(plan.starts_s))
         self.visitors: list[Process] = []
         self.killed_at: dict[str, float] = {}

@@ -161,7 +161,7 @@ _MOST_TIMES = 100
 
 
 def _whole_at(seconds: float, rate: int) -> str:
-    """Returns a sentence with the least multiple of a plant rate at which a time is whole steps; "" where none may be."""
+    """Returns a sentence with the least multiple of a plant rate at which a time is whole steps; "" for none."""
     for times in range(2, min(_MOST_TIMES, MOST_RATE_HZ // rate) + 1):
         count = seconds * rate * times
         if abs(count - round(count)) <= _WHOLE_WITHIN:
