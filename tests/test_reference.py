@@ -14,7 +14,7 @@ import pytest
 
 from haploop.api import load, read, run
 from haploop.controller.dissipation import Element, Motion
-from haploop.launch.processes.foreign import read_programs
+from haploop.launch.foreign import read_programs
 from haploop.launch.runs import start
 from haploop.launch.spec import RunFailed
 from haploop.logger.log.recording import Table

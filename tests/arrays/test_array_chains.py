@@ -9,8 +9,8 @@ import pytest
 
 from haploop.controller.dissipation import registry
 from haploop.launch.batch import batch
-from haploop.launch.batch import run as batch_run
 from haploop.launch.batch.stacking import device_of, is_batchable, structure
+from haploop.launch.runs import in_batch as batch_run
 from haploop.plant.friction import batch as friction_batch
 from haploop.protocol.scene.effects import Accelerometer, Friction, Transmission
 from haploop.protocol.scene.estimators import Acceleration

@@ -12,10 +12,10 @@ import pytest
 
 from haploop.controller.dissipation import Element, Motion, Quantity, where
 from haploop.launch.batch import batch
-from haploop.launch.batch import run as array_run
 from haploop.launch.batch.batch import Batch
-from haploop.launch.batch.run import run_batch
 from haploop.launch.batch.stacking import is_batchable, stacked, structure, structures
+from haploop.launch.runs import in_batch as array_run
+from haploop.launch.runs.in_batch import run_batch
 from haploop.logger.batch import BatchLogger
 from haploop.logger.verdict.window import Window
 from haploop.plant import choose

@@ -152,7 +152,7 @@ def test_after_swaps_too_and_the_new_one_begins_with_books_of_its_own() -> None:
 @pytest.mark.parametrize("kinds", [tuple(STABILIZERS)[:4], tuple(STABILIZERS)[4:], "swapped"], ids=str)
 def test_they_compile(kinds: tuple[str, ...] | str) -> None:
     """Four in a row, each of which finds something to do; and what is swapped."""
-    from haploop.launch.batch.jax.run import compiling
+    from haploop.launch.runs.in_jax import compiling
     from helpers.runs.compiled import agree, compiled
 
     before = compiling()[0]

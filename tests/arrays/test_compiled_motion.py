@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from haploop.launch.batch.batch import Batch
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Scene
 from helpers.runs.batches import pressed

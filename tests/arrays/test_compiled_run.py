@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from haploop.controller.dissipation import Element, Motion, Quantity, where
-from haploop.launch.batch.jax.run import compiled_results, compiling
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
+from haploop.launch.runs.in_jax import compiled_results, compiling
 from helpers.live.launched import first_and_slowly
 from helpers.runs.batches import PUSH, Stiffening, alone, pressed, with_element
 from helpers.runs.compiled import agree, compiled, many

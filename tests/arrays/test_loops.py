@@ -17,7 +17,7 @@ import pytest
 
 from haploop.controller.dissipation import registry
 from haploop.launch.batch import batch
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.logger.books import work
 from haploop.logger.books.work import BatchSums
 from haploop.plant.where_it_pays import WhereItPays

@@ -11,7 +11,7 @@ import pytest
 
 from haploop.controller import active_elements
 from haploop.controller.dissipation import Element, ElementError, Motion, Quantity
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.protocol.scene.scene import ElementTable, EventTable, Scene
 from helpers.runs.batches import alone, diverging, pressed, together, with_element
 from helpers.scenes.least import KINDS
@@ -97,7 +97,7 @@ def test_a_declared_memory_follows_its_members_when_others_are_dropped() -> None
 @pytest.mark.skipif(not importlib.util.find_spec("jax"), reason="needs jax")
 @pytest.mark.parametrize("made", [scenes(), with_events()], ids=["as it is", "set and swapped"])
 def test_a_declared_memory_compiles(made: list[Scene]) -> None:
-    from haploop.launch.batch.jax.run import compiling
+    from haploop.launch.runs.in_jax import compiling
     from helpers.runs.compiled import agree, compiled
 
     before, kinds = compiling()[0], KINDS | {"fading": Fading}

@@ -19,7 +19,7 @@ from rich.table import Table
 
 from haploop.controller.dissipation import Element, registry
 from haploop.launch.batch import batch
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.protocol.scene.paths import with_value
@@ -97,7 +97,7 @@ def main() -> None:
         rows["numba kernel, with the books"] = (lambda: run_kernel(scenes, True), len(scenes))
         rows["numba kernel, without"] = (lambda: run_kernel(scenes, False), len(scenes))
     if importlib.util.find_spec("jax"):
-        from haploop.launch.batch.jax.run import compiled_results, compiling
+        from haploop.launch.runs.in_jax import compiled_results, compiling
 
         for name, energy in {"compiled, with the books": True, "compiled, without": False}.items():
             run = partial(lambda energy: list(compiled_results(scenes, kinds, energy=energy, least=0)), energy)

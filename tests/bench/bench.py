@@ -20,7 +20,7 @@ from rich.table import Table
 from yardsticks import SCENE, loop_us, ping_pong_us, plain_loop_us
 
 from haploop.controller.dissipation import registry
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.logger.books import segments

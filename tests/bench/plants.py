@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 import haploop.logger
-from haploop.launch.processes.foreign import read_programs
+from haploop.launch.foreign import read_programs
 from haploop.launch.runs.start import prepare, run
 from haploop.tools.render.terminal import markdown_table
 from haploop.tools.render.units import amount

@@ -11,7 +11,7 @@ import zmq
 
 from haploop.launch.clock.roster import Node, Roster
 from haploop.launch.clock.server import ClockServer
-from haploop.launch.processes.foreign import Program
+from haploop.launch.foreign import Program
 from haploop.launch.processes.standstill import late_observers
 from haploop.protocol.transport.messages import PROCESSES
 from helpers.live.attacks import Stranger, pack

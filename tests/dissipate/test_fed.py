@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.file import resolved
-from haploop.launch.scene.layers import read_layers
+from haploop.launch.scene.reading.layers import read_layers
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.cli.app import app
 from haploop.tools.dissipate.figure import make_figure

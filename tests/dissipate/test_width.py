@@ -11,7 +11,7 @@ from haploop.api import read
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.file import resolved
-from haploop.launch.scene.layers import read_layers
+from haploop.launch.scene.reading.layers import read_layers
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.dissipate.recording.samples import Floats, Samples
 from haploop.tools.dissipate.swing.buzz import Buzz

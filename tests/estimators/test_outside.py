@@ -54,7 +54,7 @@ def test_members_of_a_batch_have_the_bits_of_each_alone() -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not importlib.util.find_spec("jax"), reason="needs jax")
 def test_it_compiles() -> None:
-    from haploop.launch.batch.jax.run import compiling
+    from haploop.launch.runs.in_jax import compiling
     from helpers.runs.compiled import agree, compiled
 
     compiled(scenes())

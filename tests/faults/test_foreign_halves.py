@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import haploop.logger
-from haploop.launch.processes.foreign import read_programs
+from haploop.launch.foreign import read_programs
 from haploop.launch.runs.replay import replay
 from haploop.launch.runs.start import prepare, run
 from haploop.logger.foreign import complaint, plant_columns

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from haploop.launch.processes.foreign import Program, ProgramError, check_wait, read_programs
+from haploop.launch.foreign import Program, ProgramError, check_wait, read_programs
 from haploop.launch.processes.run_directory import CommandRefused
 from helpers.live.foreign import PLAIN, Started
 from helpers.live.in_process import ask

@@ -10,7 +10,7 @@ import pytest
 
 from haploop.controller.dissipation import ElementError, PluginError
 from haploop.controller.dissipation.registry import load_source
-from haploop.launch.processes.plugin_trial import PluginTrial
+from haploop.launch.clock.plugin_trial import PluginTrial
 from haploop.protocol.scene.scene import ElementTable
 from helpers.live.in_process import ask
 from helpers.live.launched import first_and_slowly, processes_of, wait_for

@@ -15,9 +15,9 @@ import pytest
 
 from haploop.controller.dissipation import load_plugin, registry
 from haploop.launch.processes.children import Child
-from haploop.launch.processes.shown_prints import ShownPrints
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
+from haploop.launch.shown_prints import ShownPrints
 from haploop.protocol.transport.prints import NodeOutput
 from helpers.live.launched import HAPLOOP, PATIENCE_S, SCENES, command, first_and_slowly, wait_for
 from helpers.scenes.brake import source

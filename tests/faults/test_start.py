@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
+from haploop.launch.foreign import read_programs
 from haploop.launch.processes import children, deadlines, open_files
 from haploop.launch.processes.early import Started, start_early, start_node
-from haploop.launch.processes.foreign import read_programs
 from haploop.launch.spec import OutputError, RunFailed
 from haploop.protocol.transport.messages import PROCESSES
 from helpers.live.launched import BRIEF, BRIEF_S, PATIENCE_S, wait_for

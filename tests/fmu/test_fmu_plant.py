@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import haploop.logger
-from haploop.launch.processes.foreign import read_programs
+from haploop.launch.foreign import read_programs
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.spec import RunFailed
 from haploop.tools.fmu.package import host_platform

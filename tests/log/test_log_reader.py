@@ -17,7 +17,7 @@ from haploop.logger import read
 from haploop.logger.log import LogError
 from haploop.logger.log.recording import Recording, Table
 from haploop.logger.log.writer import Compression, Log
-from haploop.tools.cli.options import what_was_logged
+from haploop.tools.command.options import what_was_logged
 
 PLANT = {"timestamp": "s", "t": "s", "x": "m", "v": "m/s", "force": "N"}
 

@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 
 from haploop.controller.dissipation import registry
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.bundled import of_name

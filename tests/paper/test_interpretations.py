@@ -13,7 +13,7 @@ import pytest
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.file import load
-from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.reading.layers import Layers
 from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.paths import without
 from haploop.protocol.scene.scene import Scene

@@ -10,7 +10,7 @@ from haploop.controller.dissipation.element import raised
 from haploop.controller.dissipation.registry import load_source
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.check import resolve
-from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.reading.layers import Layers
 from haploop.protocol.plugin_file import PluginError
 from haploop.protocol.ticks import Timebase
 from haploop.tools.cli import scenes

@@ -25,7 +25,7 @@ from haploop.protocol.register import UnknownKind
 from haploop.protocol.scene.hand_force import HandForce
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.walls.registry import make_wall, wall_class
-from haploop.tools.cli.scenes import kinds_with
+from haploop.tools.command.given import kinds_with
 from haploop.tools.executor.pool import Pool
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.run_figure import draw, make_figure

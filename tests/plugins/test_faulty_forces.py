@@ -8,10 +8,10 @@ import pytest
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element, ElementError, Motion, registry
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.check import resolve
-from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.reading.layers import Layers
 from haploop.launch.spec import RunFailed
 from haploop.logger import read
 from haploop.protocol.ticks import Timebase

@@ -11,14 +11,14 @@ import pytest
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element, ElementError, Motion, PluginError, Quantity, registry
 from haploop.controller.dissipation.registry import checked, load_source
-from haploop.launch.batch.run import run_batch
-from haploop.launch.processes.plugin_trial import PluginTrial
+from haploop.launch.clock.plugin_trial import PluginTrial
+from haploop.launch.runs.in_batch import run_batch
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.replay import replay
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.check import resolve
-from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.scene.reading.layers import Layers
 from haploop.launch.scene.schema import json_schema
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.logger import read

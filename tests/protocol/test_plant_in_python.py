@@ -17,7 +17,7 @@ import pytest
 
 import haploop.logger
 from haploop.launch.clock.device_time import DELAY_STAYS, GOES_ON, PLANT, REFUSED, lateness_told
-from haploop.launch.processes.foreign import read_programs
+from haploop.launch.foreign import read_programs
 from haploop.launch.processes.run_directory import CommandRefused
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.spec import OutputError, RunFailed

@@ -10,12 +10,12 @@ from typer.testing import CliRunner
 
 from haploop.launch.scene.bundled import FOLDERS, about, bundled, own_file
 from haploop.launch.scene.file import load
-from haploop.launch.scene.layers import read_layers
 from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.scene.reading.layers import read_layers
 from haploop.protocol.scene.hand_force import Ramp, Sine
 from haploop.tools.advise.subject import assumptions
 from haploop.tools.cli.app import app
-from haploop.tools.cli.options import complete
+from haploop.tools.command.options import complete
 from haploop.tools.sweep import sweep_file
 from helpers.scenes.least import LEAST_TOML
 

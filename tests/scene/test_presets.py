@@ -10,7 +10,7 @@ import pytest
 
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.file import load
-from haploop.launch.scene.layers import read_layers
+from haploop.launch.scene.reading.layers import read_layers
 from haploop.protocol.scene.effects import Actuator, Grip
 from haploop.protocol.scene.paths import value_at, without
 from haploop.protocol.scene.scene import Encoder, Hand, Scene

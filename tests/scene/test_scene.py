@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from haploop.controller.dissipation import Element, Quantity
 from haploop.launch.scene.check import resolve
-from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.scene.reading.layers import Layers
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Clock, ElementTable, Encoder, Hand, Scene, Wall
 from haploop.protocol.ticks import Timebase, TimebaseError

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from haploop.launch.plan.effects import notes
 from haploop.launch.scene.file import load
-from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.reading.layers import Layers
 from haploop.launch.scene.schema import json_schema
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.protocol.scene.effects import Accelerometer, Friction, GammaJitter, Grip

@@ -6,7 +6,7 @@ import pytest
 
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.file import load
-from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.reading.layers import Layers
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from helpers.runs.estimates import ENCODER, KALMAN
 from helpers.scenes.least import KINDS, LEAST, mistakes, scene

@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from haploop.launch.scene.file import load
-from haploop.launch.scene.layers import Layers, lay_overrides
 from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.scene.reading.layers import Layers, lay_overrides
 from haploop.protocol.scene.hand_force import Constant
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Encoder, EventTable

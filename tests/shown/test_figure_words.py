@@ -15,7 +15,7 @@ import pytest
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.bundled import of_name
 from haploop.logger import read
-from haploop.tools.figure.command import draw_any
+from haploop.tools.draw import draw_any
 from haploop.tools.figure.data import FigureError, RunData
 from haploop.tools.figure.run_figure import draw, event_lines, key_numbers, make_figure
 from haploop.tools.figure.scene_units import element_units

@@ -11,7 +11,7 @@ import pytest
 
 from haploop.controller.dissipation import registry
 from haploop.launch.batch.batch import Batch
-from haploop.launch.batch.run import run_batch, with_verdicts
+from haploop.launch.runs.in_batch import run_batch, with_verdicts
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.launch.stability.still_batch import StillBatch

@@ -9,7 +9,7 @@ import pytest
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.judging import judge_elsewhere
 from haploop.launch.scene.check import resolve
-from haploop.launch.scene.layers import Layers
+from haploop.launch.scene.reading.layers import Layers
 from helpers.scenes.least import LEAST
 from helpers.scenes.pressed import pressed
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from haploop.controller.dissipation import registry
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.launch.stability.looks import push_of

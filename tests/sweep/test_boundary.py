@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from haploop.launch.batch.run import batch_results
+from haploop.launch.runs.in_batch import batch_results
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.search.bisect import Tolerance

@@ -10,8 +10,8 @@ from typing import Any, NoReturn
 import pytest
 from pydantic_core import PydanticCustomError
 
-from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.scene.reading.layers import Layers
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.sweep.cell_scene import Base, Values, resolved

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from haploop.controller.dissipation import PluginError
-from haploop.launch.batch.run import run_batch
-from haploop.launch.processes.one_thread import THREADS, ask_for_one_thread
+from haploop.launch.one_thread import THREADS, ask_for_one_thread
+from haploop.launch.runs.in_batch import run_batch
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.executor.executors import make_executor, map_parallel
 from haploop.tools.executor.pool import DIED, Group, Pool, Sizes, cut, grouped

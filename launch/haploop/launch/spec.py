@@ -12,9 +12,9 @@ from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from haploop.launch.processes.foreign import WAIT_S, Program
-from haploop.launch.processes.shown_prints import PRINTS
+from haploop.launch.foreign import WAIT_S, Program
 from haploop.launch.scene.toml_writer import to_toml
+from haploop.launch.shown_prints import PRINTS
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.transport.sockets import Transport
 from haploop.protocol.transport.wire import Message

@@ -12,8 +12,8 @@ import numpy as np
 
 from haploop.controller.estimators.base import Estimator
 from haploop.controller.estimators.choose import make_estimators
+from haploop.protocol.brought import is_of_file
 from haploop.protocol.plugin_file import PluginError, raised_in_file
-from haploop.protocol.scene.brought import is_of_file
 from haploop.protocol.scene.hand_force import HandForce
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase

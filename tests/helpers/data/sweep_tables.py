@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.sweep.map.data import AMPLITUDE, PROVISOS, MapData, make_map_data

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from haploop.controller.dissipation import Element
-from haploop.launch.batch.jax.run import compiled_results
+from haploop.launch.runs.in_jax import compiled_results
 from haploop.protocol.scene.scene import Scene
 from helpers.runs.batches import pressed
 from helpers.scenes.least import KINDS

@@ -6,8 +6,8 @@ from typing import Any
 from haploop.controller.dissipation import registry
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.file import load
-from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.scene.reading.layers import Layers
 from haploop.protocol.scene.scene import Scene
 
 KINDS = registry()

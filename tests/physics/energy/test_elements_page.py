@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from haploop.controller.dissipation.registry import load_source
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from helpers.runs.batches import alone, pressed, together, with_element
 from helpers.scenes.least import KINDS, scene
 

@@ -194,7 +194,7 @@ def plot(what: Result | str | Path | Sequence[Result | str | Path], target: str 
         ValueError: a run was kept in memory alone.
         FigureError: there is nothing to draw, or matplotlib is not installed.
     """
-    from haploop.tools.figure.command import draw_any
+    from haploop.tools.draw import draw_any
 
     directories = []
     for one in [what] if isinstance(what, Result | str | Path) else what:

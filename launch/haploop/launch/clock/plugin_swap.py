@@ -6,8 +6,8 @@ from collections.abc import Generator, Sequence
 from typing import TYPE_CHECKING
 
 from haploop.launch.clock.clock import Clock, ClockError
+from haploop.launch.clock.plugin_trial import PluginTrial, read_source
 from haploop.launch.clock.reloads import Code, Reloads
-from haploop.launch.processes.plugin_trial import PluginTrial, read_source
 from haploop.launch.spec import keep_plugin
 from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import ElementTable

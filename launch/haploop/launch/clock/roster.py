@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from haploop.launch.processes.foreign import NO_PROGRAMS, ROLES, Program
+from haploop.launch.foreign import NO_PROGRAMS, ROLES, Program
 from haploop.launch.spec import PROGRAMS
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.wire import Message

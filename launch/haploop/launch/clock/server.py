@@ -12,7 +12,7 @@ from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.device_time import PLANT
 from haploop.launch.clock.joining import what_joins, why_refused
 from haploop.launch.clock.roster import Node, Roster
-from haploop.launch.processes.foreign import NO_PROGRAMS, Program
+from haploop.launch.foreign import NO_PROGRAMS, Program
 from haploop.launch.spec import RunFailed
 from haploop.protocol.changes import REFUSALS, refusals_of
 from haploop.protocol.transport.machine import machine_of

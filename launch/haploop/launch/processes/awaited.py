@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from haploop.launch.clock.server import ClockServer
-from haploop.launch.processes.foreign import Program, seat_file
+from haploop.launch.foreign import Program, seat_file
 from haploop.launch.spec import NeverBegan
 from haploop.protocol.transport.machine import Machine
 from haploop.protocol.transport.wire import Message

@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from pathlib import Path
 from typing import Any
 
+from haploop.launch.foreign import Program
+from haploop.launch.one_thread import ask_for_one_thread
 from haploop.launch.processes.early import Started, start_node, start_process
-from haploop.launch.processes.foreign import Program
-from haploop.launch.processes.one_thread import ask_for_one_thread
 from haploop.launch.spec import OutputError
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.wire import Message

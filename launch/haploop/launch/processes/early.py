@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping, MutableMapping, Sequence
 from typing import NamedTuple
 
-from haploop.launch.processes.one_thread import ask_for_one_thread
+from haploop.launch.one_thread import ask_for_one_thread
 from haploop.launch.processes.open_files import ask_for_many
 from haploop.protocol.transport.messages import PROCESSES
 

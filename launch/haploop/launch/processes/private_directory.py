@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from haploop.launch.processes.foreign import ROLES, seat_file
+from haploop.launch.foreign import ROLES, seat_file
 from haploop.launch.spec import OutputError
 from haploop.protocol.transport.messages import PROCESSES
 

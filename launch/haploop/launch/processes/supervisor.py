@@ -19,15 +19,15 @@ from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.commands import Commands
 from haploop.launch.clock.device_time import PLANT, lateness_told
 from haploop.launch.clock.server import ClockServer
+from haploop.launch.foreign import Program
 from haploop.launch.processes import open_files, private_directory, run_directory
 from haploop.launch.processes.awaited import Awaited
 from haploop.launch.processes.children import Child, interrupts, start_children
 from haploop.launch.processes.deadlines import LAST_WORDS_S, Deadlines
-from haploop.launch.processes.foreign import Program
-from haploop.launch.processes.shown_prints import PRINTS, ShownPrints
+from haploop.launch.shown_prints import PRINTS, ShownPrints
 from haploop.launch.spec import OutputError, RunFailed, RunSpec
+from haploop.protocol.brought import names_of_files
 from haploop.protocol.changes import Event
-from haploop.protocol.scene.brought import names_of_files
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.machine import Machine, machine_of
 from haploop.protocol.transport.sockets import SecureContext, Transport, with_host_of

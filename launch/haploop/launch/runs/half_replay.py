@@ -11,7 +11,7 @@ import numpy as np
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element, ElementError
-from haploop.launch.processes.foreign import described
+from haploop.launch.foreign import described
 from haploop.launch.runs.run_files import holds_readings
 from haploop.launch.spec import PROGRAMS
 from haploop.logger.books.buffers import as_float64

@@ -13,7 +13,7 @@ from haploop.controller.tried import try_kinds
 from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
-from haploop.launch.scene.layers import Layers, lay_overrides
+from haploop.launch.scene.reading.layers import Layers, lay_overrides
 from haploop.launch.scene.toml_writer import inline, to_toml
 from haploop.launch.scene.unmodelled import demand_modelled
 from haploop.protocol.installed import Brought, all_brought, bring

@@ -11,8 +11,8 @@ import haploop.logger
 from haploop.controller.dissipation import Element, registry
 from haploop.launch.runs.stand_ins import elements_for, standing_in
 from haploop.launch.scene.check import resolve
-from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import Mistake, SceneError
+from haploop.launch.scene.reading.layers import Layers
 from haploop.launch.scene.reading.tables import parse
 from haploop.launch.spec import SCENE
 from haploop.logger.log import LogError

@@ -60,7 +60,7 @@ def _with_plugins(
     scene_path: Path, overrides: Sequence[str], plugins: Sequence[Path], any_hand: bool
 ) -> tuple[Scene, dict[str, type[Element]], dict[str, Path]]:
     """Returns the scene, every kind by name and the file of each that has one, all of them tried."""
-    from haploop.launch.processes.plugin_trial import PluginTrial, read_source
+    from haploop.launch.clock.plugin_trial import PluginTrial, read_source
 
     kinds, sources = registry(), {}
     with ExitStack() as open_trials:

@@ -15,9 +15,9 @@ from haploop.launch.plan.effect import Draft
 from haploop.launch.plan.effects import all_effects
 from haploop.launch.scene.estimator_keys import check_estimators, check_filter
 from haploop.launch.scene.events import check_events
-from haploop.launch.scene.layers import KeyPath, Layers
 from haploop.launch.scene.mistakes import Mistake, SceneError
 from haploop.launch.scene.models import Model, number_of, read_table, scene_model
+from haploop.launch.scene.reading.layers import KeyPath, Layers
 from haploop.launch.scene.schema import Schema, alternatives, keys_of_all, schema_at, whole_schema
 from haploop.launch.scene.toml_writer import inline
 from haploop.launch.scene.unmodelled import check_hand

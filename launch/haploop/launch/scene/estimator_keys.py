@@ -5,8 +5,8 @@ from __future__ import annotations
 from pydantic_core import PydanticCustomError
 
 from haploop.controller.estimators.choose import estimators_for
-from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.models import number_of
+from haploop.launch.scene.reading.layers import Layers
 from haploop.protocol.scene.effects import Noise
 from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.scene import Scene

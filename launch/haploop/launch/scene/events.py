@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from pydantic_core import PydanticCustomError
 
 from haploop.controller.active_elements import make_element
-from haploop.launch.scene.layers import KeyPath, Layers
 from haploop.launch.scene.mistakes import counted
 from haploop.launch.scene.models import number_of
 from haploop.launch.scene.number import Number
+from haploop.launch.scene.reading.layers import KeyPath, Layers
 from haploop.protocol.changes import Event
 from haploop.protocol.names import nearest
 from haploop.protocol.scene.scene import NO_ELEMENT, Clock, ElementTable, EventTable, Scene, Wall

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import in_order_of_time
-from haploop.launch.scene.layers import Layers, lay_overrides, read_layers
 from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError, shown
+from haploop.launch.scene.reading.layers import Layers, lay_overrides, read_layers
 from haploop.launch.scene.reading.lines import KeyPath, line_in
 from haploop.launch.scene.reading.shorthand import put_in_full
 from haploop.launch.scene.unmodelled import demand_modelled

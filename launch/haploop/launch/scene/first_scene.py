@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from haploop.launch.scene.bundled import bundled
-from haploop.launch.scene.layers import Layers, read_layers
+from haploop.launch.scene.reading.layers import Layers, read_layers
 from haploop.launch.scene.toml_writer import inline
 from haploop.launch.scene.units import from_text
 from haploop.protocol.names import nearest

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from haploop.launch.plan.effect import Draft
-from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.scene.reading.layers import Layers
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Hand, Scene, hand_is_unmodelled
 

@@ -7,8 +7,8 @@ from dataclasses import MISSING, replace
 from typing import TYPE_CHECKING
 
 from haploop.launch.scene.events import elements_of
-from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.models import number_of
+from haploop.launch.scene.reading.layers import Layers
 from haploop.protocol.scene.scene import Scene, Wall
 from haploop.protocol.walls.registry import all_walls, class_of
 from haploop.protocol.walls.wall import Spring

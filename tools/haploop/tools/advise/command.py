@@ -22,8 +22,8 @@ from haploop.tools.advise.subject import InvalidRequest, Subject, make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop
 from haploop.tools.advise.walls.store import Store
 from haploop.tools.advise.walls.trial import Trial
-from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors, print_json
-from haploop.tools.cli.scenes import kinds_with, print_notes
+from haploop.tools.command.given import kinds_with, print_notes
+from haploop.tools.command.options import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.terminal import console
 

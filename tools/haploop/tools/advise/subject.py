@@ -13,7 +13,7 @@ from typing import Any
 from haploop.controller.dissipation import Element
 from haploop.launch.scene.bundled import bundled, found, like
 from haploop.launch.scene.file import resolved
-from haploop.launch.scene.layers import Layers, read_layers
+from haploop.launch.scene.reading.layers import Layers, read_layers
 from haploop.protocol.changes import Change, at_work
 from haploop.protocol.names import nearest
 from haploop.protocol.scene.scene import Scene

@@ -19,7 +19,7 @@ from haploop.protocol.transport.messages import OBSERVER
 from haploop.protocol.transport.sockets import SecureContext
 from haploop.tools.attach.live_table import attach_print
 from haploop.tools.attach.plotjuggler import PORT, attach_plotjuggler
-from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors
+from haploop.tools.command.options import FAILED, WRONG_USE, leave, plain_errors
 from haploop.tools.render.report import print_summary
 
 TARGETS = ("logger", "print", "plotjuggler")

@@ -14,7 +14,7 @@ from haploop.protocol.changes import describe
 from haploop.protocol.transport.clock_client import Refused
 from haploop.tools.attach.live_status import LiveStatus
 from haploop.tools.attach.observed_run import ObservedRun, read_summary
-from haploop.tools.cli.options import FAILED, WRONG_USE, leave
+from haploop.tools.command.options import FAILED, WRONG_USE, leave
 from haploop.tools.render.terminal import console, make_facts, make_table, seen, verdict_style
 from haploop.tools.render.units import amount, fixed
 

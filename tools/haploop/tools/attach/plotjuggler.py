@@ -31,7 +31,7 @@ from haploop.protocol.transport.clock_client import Refused
 from haploop.protocol.transport.sockets import has_message, open_socket
 from haploop.protocol.transport.wire import Frame
 from haploop.tools.attach.observed_run import ObservedRun, iterate_runs
-from haploop.tools.cli.options import WRONG_USE, leave
+from haploop.tools.command.options import WRONG_USE, leave
 
 ROLE = "plotjuggler"
 # Wall time that goes into one message of each topic.

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from haploop.tools.cli.options import FAILED, WRONG_USE, Json, complete, leave, plain_errors, print_json
+from haploop.tools.command.options import FAILED, WRONG_USE, Json, complete, leave, plain_errors, print_json
 
 _YOURS = "here your own file is taken: {0}"
 

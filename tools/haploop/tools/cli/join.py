@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from haploop.tools.cli.options import FAILED, WRONG_USE, leave
+from haploop.tools.command.options import FAILED, WRONG_USE, leave
 
 
 def join(

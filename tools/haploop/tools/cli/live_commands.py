@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from haploop.tools.cli.options import (
+from haploop.tools.cli.which_run import for_a_run
+from haploop.tools.command.options import (
     Json,
     Run,
     parse_assignments,
@@ -17,7 +18,6 @@ from haploop.tools.cli.options import (
     plain_errors,
     print_json,
 )
-from haploop.tools.cli.which_run import for_a_run
 
 
 @for_a_run

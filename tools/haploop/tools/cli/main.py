@@ -8,7 +8,7 @@ import sys
 from copy import copy
 
 from haploop.protocol.installed import PluginError
-from haploop.tools.cli.interrupt import SENTENCE, TYPE_CHECKING, LeavingAtOnce
+from haploop.tools.command.interrupt import SENTENCE, TYPE_CHECKING, LeavingAtOnce
 
 if TYPE_CHECKING:
     from haploop.launch.processes.early import Started
@@ -23,7 +23,7 @@ def main() -> None:
     try:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         with LeavingAtOnce(early):
-            from haploop.launch.processes.one_thread import ask_for_one_thread
+            from haploop.launch.one_thread import ask_for_one_thread
 
             ask_for_one_thread(os.environ)
             if sys.argv[1:2] == ["run"]:  # what starts no processes loads no more for it

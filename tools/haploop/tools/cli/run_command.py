@@ -10,8 +10,10 @@ from typing import Annotated
 
 import typer
 
-from haploop.tools.cli.interrupt import LeavingAtOnce
-from haploop.tools.cli.options import (
+from haploop.tools.cli.view import UntilClosed
+from haploop.tools.command.given import print_notes
+from haploop.tools.command.interrupt import LeavingAtOnce
+from haploop.tools.command.options import (
     FAILED,
     WRONG_USE,
     Json,
@@ -25,8 +27,6 @@ from haploop.tools.cli.options import (
     print_json,
     what_was_logged,
 )
-from haploop.tools.cli.scenes import print_notes
-from haploop.tools.cli.view import UntilClosed
 
 
 def run(
@@ -64,7 +64,7 @@ def run(
     """Run a scene to its end. Other terminals can steer and watch it meanwhile. The last line names its directory."""
     early = (context.obj or {}).get("early", {})
     with LeavingAtOnce(early):
-        from haploop.launch.processes.foreign import ProgramError, check_wait, read_programs
+        from haploop.launch.foreign import ProgramError, check_wait, read_programs
         from haploop.launch.runs import start
         from haploop.launch.scene.toml_writer import inline
         from haploop.launch.spec import SCENE, RunFailed, discard

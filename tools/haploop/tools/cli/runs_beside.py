@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from haploop.tools.cli.options import WRONG_USE, Directory, Json, Plugin, leave, plain_errors, print_json
-from haploop.tools.cli.scenes import kinds_with
+from haploop.tools.command.given import kinds_with
+from haploop.tools.command.options import WRONG_USE, Directory, Json, Plugin, leave, plain_errors, print_json
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -52,7 +52,7 @@ def plot(
     A run that was killed is drawn as far as its log goes, a sweep as far as it has come. The last line names the
     figure's file.
     """
-    from haploop.tools.figure.command import draw_any
+    from haploop.tools.draw import draw_any
     from haploop.tools.figure.data import FigureError
 
     with plain_errors():

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from haploop.tools.cli.options import (
+from haploop.tools.command.given import kinds_with, print_note, print_notes
+from haploop.tools.command.options import (
     FAILED,
     WRONG_USE,
     Directory,
@@ -26,11 +27,7 @@ from haploop.tools.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from haploop.controller.dissipation import Element
-    from haploop.launch.plan.meant.rule import Note
-    from haploop.protocol.scene.scene import Scene
 
 # More samples of a recorded force than this are not printed to a terminal.
 _MOST_PRINTED = 20
@@ -185,33 +182,3 @@ def export(
     from haploop.tools.export.command import export_run
 
     export_run(directory, to, out, topics, force)
-
-
-def kinds_with(plugins: list[Path]) -> dict[str, type[Element]]:
-    """Returns the installed elements and those of some files."""
-    from haploop.controller.dissipation import registry
-
-    return registry(plugins)
-
-
-def print_note(note: str) -> None:
-    """Prints a note on stderr, unless there is none."""
-    if note:
-        print(f"Note: {note}", file=sys.stderr)
-
-
-def print_notes(
-    scene: Scene, kinds: Mapping[str, type[Element]], path: Path | None = None, overrides: Sequence[str] = ()
-) -> list[Note]:
-    """Prints on stderr what in a resolved scene may not be what was meant, one line each; returns it.
-
-    With the file it was read from, and what was laid over that, each begins with the file and line it speaks of.
-    """
-    from haploop.launch.plan.effects import notes
-    from haploop.launch.scene.file import places
-
-    found = notes(scene, kinds)
-    where = places(path, overrides, [note.key for note in found]) if path and found else [""] * len(found)
-    for note, place in zip(found, where, strict=True):
-        print(f"{place}: Note: {note}" if place else f"Note: {note}", file=sys.stderr)
-    return found

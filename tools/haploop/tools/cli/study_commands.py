@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from haploop.tools.cli.options import Delay, Device, Estimator, Hand, Json, Plugin, Set, SweepFile, parse_seconds
+from haploop.tools.command.options import Delay, Device, Estimator, Hand, Json, Plugin, Set, SweepFile, parse_seconds
 
 
 def sweep(

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from haploop.tools.cli.live_runs import LiveRuns
-from haploop.tools.cli.options import WRONG_USE, leave, plain_errors
 from haploop.tools.cli.which_run import for_a_run
+from haploop.tools.command.options import WRONG_USE, leave, plain_errors
 
 if TYPE_CHECKING:
     import asyncio

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from haploop.tools.cli.options import WRONG_USE, leave, parse_seconds
+from haploop.tools.command.options import WRONG_USE, leave, parse_seconds
 
 _ADDRESS = "a run elsewhere, HOST:PORT as haploop run --tcp said"
 _TIME = 'simulated time of the change, s or "1500 ms", at once without; or '

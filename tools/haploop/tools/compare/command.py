@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from haploop.tools.cli.options import (
+from haploop.tools.command.options import (
     FAILED,
     WRONG_USE,
     Delay,
@@ -59,7 +59,7 @@ def compare(
     Can be stopped; the same command with --out DIR, the directory of the first, goes on.
     """
     from haploop.tools.advise.subject import InvalidRequest, make_subject
-    from haploop.tools.cli.scenes import kinds_with
+    from haploop.tools.command.given import kinds_with
 
     if workers is not None and workers < 1:
         leave(f"--workers must be at least 1, but {workers} was given.", WRONG_USE)

@@ -18,8 +18,8 @@ from haploop.tools.advise.families import (
 )
 from haploop.tools.advise.report import format_stiffness
 from haploop.tools.advise.subject import make_subject
-from haploop.tools.cli.options import FAILED, WRONG_USE, leave
-from haploop.tools.cli.scenes import kinds_with
+from haploop.tools.command.given import kinds_with
+from haploop.tools.command.options import FAILED, WRONG_USE, leave
 from haploop.tools.compare.command import ROWS, find
 from haploop.tools.compare.comparison import Comparison, OfLoop
 from haploop.tools.compare.figure import figure_of

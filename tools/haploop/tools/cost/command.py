@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from haploop.tools.cli.options import FAILED, WRONG_USE, Json, leave, plain_errors, print_json
+from haploop.tools.command.options import FAILED, WRONG_USE, Json, leave, plain_errors, print_json
 from haploop.tools.render.progress import bars
 
 

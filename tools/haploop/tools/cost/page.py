@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Group, RenderableType
 from rich.text import Text
 
-from haploop.tools.cli.options import WRONG_USE, leave
+from haploop.tools.command.options import WRONG_USE, leave
 from haploop.tools.cost import figure, prices_figure
 from haploop.tools.cost.data import Cost, CostFileError, Point, PriceGroup, SceneCost, load
 from haploop.tools.cost.findings import (

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from haploop.tools.cli.interrupt import LeavingAtOnce
-from haploop.tools.cli.options import FAILED, leave, plain_errors, what_was_logged
+from haploop.tools.command.interrupt import LeavingAtOnce
+from haploop.tools.command.options import FAILED, leave, plain_errors, what_was_logged
 
 SCENE, FIGURE = "demo", "figure.png"
 

@@ -13,10 +13,10 @@ from typing import Any
 from haploop.controller.dissipation import Element
 from haploop.launch.runs.run_files import holds_readings
 from haploop.launch.scene.file import resolved
-from haploop.launch.scene.layers import Layers, key_path
+from haploop.launch.scene.reading.layers import Layers, key_path
 from haploop.protocol.scene.scene import Clock, Device, Scene, accelerometer_is_used
-from haploop.tools.cli.options import FAILED, WRONG_USE, leave, parse_assignments, plain_errors, print_json
-from haploop.tools.cli.scenes import kinds_with
+from haploop.tools.command.given import kinds_with
+from haploop.tools.command.options import FAILED, WRONG_USE, leave, parse_assignments, plain_errors, print_json
 from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.outcome import Outcome, Recording, make_outcome, make_tried

@@ -10,7 +10,7 @@ from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.dissipate.force_book import Passivity
 from haploop.tools.dissipate.outcome import EQUAL_N, ElementOutcome, ForceOutcome, Outcome
-from haploop.tools.dissipate.swing.sentences import NEXT, buzz_sentence, filtered_out, low_pass
+from haploop.tools.dissipate.sentences import NEXT, buzz_sentence, filtered_out, low_pass
 from haploop.tools.render.terminal import make_table
 from haploop.tools.render.units import amount, fixed
 

@@ -15,7 +15,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, Self, TypeVar
 
-from haploop.launch.processes.one_thread import ask_for_one_thread
+from haploop.launch.one_thread import ask_for_one_thread
 from haploop.protocol.installed import sources_brought
 from haploop.protocol.plugin_file import bring_source
 from haploop.protocol.transport.prints import unheard

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from haploop.controller.dissipation import load_plugin
-from haploop.launch.batch.run import FEWEST
 from haploop.launch.batch.stacking import is_batchable, structure
+from haploop.launch.runs.in_batch import FEWEST
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.executors import make_executor
@@ -119,7 +119,7 @@ class Pool:
         """Yields the index of each resolved scene and its result, in the order in which they come in.
 
         Scenes are taken a few thousand at a time; one that fails, or kills its worker, has a result with its reason.
-        ``energy`` and ``trajectories`` are as of ``haploop.launch.batch.run.batch_results``.
+        ``energy`` and ``trajectories`` are as of ``haploop.launch.runs.in_batch.batch_results``.
 
         Raises:
             PluginError, ExecutorError: a plugin cannot be used, or no worker can be started.

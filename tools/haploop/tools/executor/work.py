@@ -72,10 +72,10 @@ class Work:
         if self.compiled:
             import jax  # noqa: F401 (an error raised here is no fault of a scene)
 
-            from haploop.launch.batch.jax.run import compiled_results
+            from haploop.launch.runs.in_jax import compiled_results
 
             return partial(compiled_results, kinds=kinds, energy=self.energy)
-        from haploop.launch.batch.run import batch_results
+        from haploop.launch.runs.in_batch import batch_results
 
         return partial(batch_results, kinds=kinds, energy=self.energy, trajectories=self.trajectories)
 

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from haploop.launch.spec import OutputError
 from haploop.logger.log.stream import LogStream, survey
-from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors
+from haploop.tools.command.options import FAILED, WRONG_USE, leave, plain_errors
 from haploop.tools.export.archives import JsonMcapWriter, NpzWriter
 from haploop.tools.export.tables import CsvWriter, ExportWriter, ParquetWriter
 from haploop.tools.render.terminal import console

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from haploop.tools.cli.options import FAILED, WRONG_USE, SceneFile, Set, leave, plain_errors
+from haploop.tools.command.options import FAILED, WRONG_USE, SceneFile, Set, leave, plain_errors
 
 
 def export_fmu(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from haploop.launch.processes.foreign import described
+from haploop.launch.foreign import described
 from haploop.launch.scene.mistakes import counted
 from haploop.tools.render.cause import SWINGS, cause
 from haploop.tools.render.terminal import console, make_facts, make_table, told, verdict_style

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from haploop.launch.scene.check import validated, with_rules
-from haploop.launch.scene.layers import Layers, key_path, lay_value
 from haploop.launch.scene.mistakes import Mistake, SceneError
+from haploop.launch.scene.reading.layers import Layers, key_path, lay_value
 from haploop.launch.scene.toml_writer import lines, to_toml
 from haploop.protocol.scene.paths import value_at, with_values
 from haploop.protocol.scene.scene import Scene

@@ -13,8 +13,8 @@ import numpy as np
 
 from haploop.launch.batch.stacking import is_batchable
 from haploop.launch.scene.events import elements_of, try_out
-from haploop.launch.scene.layers import key_path
 from haploop.launch.scene.models import number_of
+from haploop.launch.scene.reading.layers import key_path
 from haploop.launch.scene.toml_writer import inline, to_toml
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.paths import value_at

@@ -16,7 +16,7 @@ from haploop.launch.processes.children import interrupts
 from haploop.launch.spec import PLUGINS, OutputError, keep_plugin, kept_name, make_output
 from haploop.logger.log import LogError
 from haploop.logger.summary import Summary, read, write
-from haploop.tools.cli.options import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.command.options import FAILED, WRONG_USE, leave, plain_errors, print_json
 from haploop.tools.executor.executors import ExecutorError
 from haploop.tools.executor.pool import Pool, read_sources
 from haploop.tools.machine import machine, versions

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 from pydantic import ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.models import Model, scene_model
 from haploop.launch.scene.number import Number, si
+from haploop.launch.scene.reading.layers import Layers
 from haploop.protocol.names import nearest
 from haploop.protocol.quantity import Quantity
 

@@ -16,10 +16,10 @@ from haploop.launch.runs.loaded_scene import texts
 from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.bundled import found
 from haploop.launch.scene.check import complain
-from haploop.launch.scene.layers import KeyPath, Layers, key_path, lay_overrides, read_layers
 from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, shown
 from haploop.launch.scene.models import Model
 from haploop.launch.scene.number import Number, si
+from haploop.launch.scene.reading.layers import KeyPath, Layers, key_path, lay_overrides, read_layers
 from haploop.launch.scene.reading.lines import line_in
 from haploop.launch.scene.reading.tables import parse
 from haploop.launch.scene.schema import TomlSchema

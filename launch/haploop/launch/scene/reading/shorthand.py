@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 from pydantic_core import PydanticCustomError
 
-from haploop.launch.scene.layers import Layers
 from haploop.launch.scene.mistakes import COMMAND_LINE
 from haploop.launch.scene.models import number_of
+from haploop.launch.scene.reading.layers import Layers
 from haploop.launch.scene.reading.trace import TraceError, read_trace
 from haploop.protocol.quantity import si
 from haploop.protocol.scene.table import Table

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from haploop.tools.cli.options import WRONG_USE, leave, plain_errors
+from haploop.tools.command.options import WRONG_USE, leave, plain_errors
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.progress import bars
 from haploop.tools.studies.choi2022.answers import Answers

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from haploop.controller.dissipation import registry
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.tools.search.intervals import Interval, mean_interval
 from haploop.tools.studies.choi2022.answers import Answers
 from haploop.tools.studies.choi2022.device import Setup

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from haploop.controller.dissipation import registry
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.launch.spec import RunFailed
 from haploop.logger.summary import Summary
 from haploop.logger.verdict.measures import NO_SWING, SWINGING

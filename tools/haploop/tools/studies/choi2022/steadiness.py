@@ -20,7 +20,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from haploop.controller.dissipation import registry
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene, by_window
 from haploop.tools.search.bisect import rungs_held

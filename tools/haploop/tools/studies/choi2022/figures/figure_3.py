@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.controller.dissipation import registry
-from haploop.launch.batch.run import run_batch
+from haploop.launch.runs.in_batch import run_batch
 from haploop.logger.summary import Summary
 from haploop.protocol.scene.paths import without
 from haploop.protocol.scene.scene import Encoder, Scene

@@ -85,7 +85,7 @@ Json = Annotated[bool, typer.Option("--json", help="one JSON object on stdout")]
 
 def parse_assignments(texts: list[str]) -> dict[str, Any]:
     """Returns ``KEY=VALUE`` words as a table; a value is TOML where it parses, else text ("0.15 N/mm")."""
-    from haploop.launch.scene.layers import split_assignment
+    from haploop.launch.scene.reading.layers import split_assignment
 
     pairs = [split_assignment(text) for text in texts]
     if None in pairs:

@@ -20,7 +20,7 @@ from typing import Any, Self
 
 from haploop.controller.dissipation.element import Element, ElementError, hint_of
 from haploop.controller.dissipation.registry import PluginError
-from haploop.launch.processes.one_thread import ask_for_one_thread
+from haploop.launch.one_thread import ask_for_one_thread
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.scene import ElementTable
 

@@ -7,8 +7,8 @@ from importlib import import_module
 from typing import Any
 
 from haploop.controller.dissipation import ElementError
-from haploop.launch.batch.run import FEWEST, Kinds, batch_results, groups, with_verdicts
 from haploop.launch.batch.stacking import structure
+from haploop.launch.runs.in_batch import FEWEST, Kinds, batch_results, groups, with_verdicts
 from haploop.logger.summary import Summary
 from haploop.plant.choose import needs_chain
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used

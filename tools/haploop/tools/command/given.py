@@ -1,0 +1,44 @@
+"""What a command was given: elements of plugin files, and notes on its scene or its recording."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from haploop.controller.dissipation import Element
+    from haploop.launch.plan.meant.rule import Note
+    from haploop.protocol.scene.scene import Scene
+
+
+def kinds_with(plugins: list[Path]) -> dict[str, type[Element]]:
+    """Returns the installed elements and those of some files."""
+    from haploop.controller.dissipation import registry
+
+    return registry(plugins)
+
+
+def print_note(note: str) -> None:
+    """Prints a note on stderr, unless there is none."""
+    if note:
+        print(f"Note: {note}", file=sys.stderr)
+
+
+def print_notes(
+    scene: Scene, kinds: Mapping[str, type[Element]], path: Path | None = None, overrides: Sequence[str] = ()
+) -> list[Note]:
+    """Prints on stderr what in a resolved scene may not be what was meant, one line each; returns it.
+
+    With the file it was read from, and what was laid over that, each begins with the file and line it speaks of.
+    """
+    from haploop.launch.plan.effects import notes
+    from haploop.launch.scene.file import places
+
+    found = notes(scene, kinds)
+    where = places(path, overrides, [note.key for note in found]) if path and found else [""] * len(found)
+    for note, place in zip(found, where, strict=True):
+        print(f"{place}: Note: {note}" if place else f"Note: {note}", file=sys.stderr)
+    return found
