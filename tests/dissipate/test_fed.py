@@ -16,6 +16,7 @@ from haploop.launch.scene.reading.layers import read_layers
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.cli.app import app
 from haploop.tools.dissipate.figure import make_figure
+from haploop.tools.dissipate.force_sign import ForceSign
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.dissipate.recording.text_recording import Layout
@@ -114,3 +115,51 @@ def test_where_the_sign_of_the_force_is_in_doubt_so_is_who_feeds_the_swing(tmp_p
     assert "which way depends on its sign" in said
     assert FEEDS not in said
     assert TAKES not in said
+
+
+def late_spring(sign: float, late: int) -> Floats:
+    """A spring a sample late or more, which gives to the swing; with the sign that it has, or the other."""
+    x = np.minimum(pressed(S), 0.0)
+    return -sign * K * np.concatenate([np.zeros(late), x[: len(x) - late]])
+
+
+@pytest.mark.parametrize("late", [1, 4])
+def test_a_force_that_pushes_back_feeds_the_swing_whatever_it_gave_before_and_one_that_pulls_in_is_in_doubt(
+    tmp_path: Path, late: int
+) -> None:
+    """What a buzz gave first makes the books say other sign; how the force stands to the depth says that it is none."""
+    right, wrong = (booked(tmp_path, late_spring(sign, late)) for sign in (1.0, -1.0))
+    for found, pushes_back, word in ((right, True, FEEDS), (wrong, False, "which way depends on its sign")):
+        assert found.force
+        assert found.force.pushes_back is pushes_back
+        said = shown(make_report(found), 400)
+        assert word in said
+        assert ("recorded with the other sign (then --force-unit -1)" in said) is not pushes_back
+        assert TAKES not in said
+
+
+@pytest.mark.parametrize("of", ["damper", "inertia", "noise", "nothing", "short"])
+def test_a_force_that_is_no_springs_says_nothing_of_its_sign(of: str) -> None:
+    x = 5e-3 * np.sin(2.0 * np.pi * 0.7 * S) + 1e-4 * np.sin(W * S)
+    v, a = np.gradient(x, S), np.gradient(np.gradient(x, S), S)
+    noise = np.random.default_rng(3).normal(size=len(S))
+    force = {"damper": -2.0 * v, "inertia": -0.02 * a, "noise": noise, "nothing": 0.0 * x, "short": -K * x}[of]
+    sign = ForceSign(1e-3)
+    sign.add(x[: 1900 if of == "short" else None], force[: 1900 if of == "short" else None], begins=True)
+    assert sign.pushes_back is None
+
+
+def test_the_sign_of_a_force_is_the_same_in_whatever_pieces_it_comes_and_a_gap_ends_a_block() -> None:
+    x = pressed(S)
+    found = set()
+    for size in (1, 7, 250, 4000):
+        sign = ForceSign(1e-3)
+        for first in range(0, len(x), size):
+            part = slice(first, first + size)
+            sign.add(x[part], -K * np.minimum(x[part], 0.0), begins=first == 0)
+        found.add(sign.pushes_back)
+    assert found == {True}
+    gaps = ForceSign(1e-3)
+    for first in range(0, 4000, 200):
+        gaps.add(x[first : first + 200], -K * x[first : first + 200], begins=True)
+    assert gaps.pushes_back is None

@@ -17,6 +17,7 @@ from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.force_book import ForceBook, ForceRows
+from haploop.tools.dissipate.force_sign import ForceSign
 from haploop.tools.dissipate.recording.samples import Floats, Samples
 
 # Estimates begin at rest: the jump of the first samples is no noise.
@@ -82,6 +83,7 @@ class Booking:
         self._elements = len(scene.dissipation)
         self._count = self._elements + has_force
         self.force = ForceBook(period_s, delay_s) if has_force else None
+        self.force_sign = ForceSign(period_s)
         self._sums = no_sums(2 * self._count)
         self._events = _wall_events(scene, self._time)
         self.taken_J, self.given_J, self.strongest_N, self._fast_N2, self._slow_N2 = np.zeros((5, self._count))
@@ -114,6 +116,8 @@ class Booking:
         some = answer[:, _FIRST if piece.begins else 0 :]
         self._fast_N2 += (np.diff(some) ** 2).sum(axis=1)
         self._slow_N2 += ((some[:, 1:] + some[:, :-1]) ** 2).sum(axis=1)
+        if piece.force_N is not None:
+            self.force_sign.add(piece.x_m, piece.force_N, piece.begins)
         totals = self._add(added)[:, 1:]
         sampled, true = np.split(totals, 2)
         force = self.force.add(piece, v, added[-1], true[-1]) if self.force else None

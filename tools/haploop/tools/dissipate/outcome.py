@@ -73,12 +73,20 @@ class ForceOutcome:
         books: as those of an element.
         naive_J: the sum -F v T over the same samples.
         excess_J: the most that it gave out beyond what it had taken.
+        pushes_back: whether it does, as that of a wall, or pulls further in; None where neither is seen. That of a log
+            is known to.
     """
 
     books: ElementOutcome
     naive_J: float
     passivity: Passivity
     excess_J: float
+    pushes_back: bool | None = None
+
+    @property
+    def sign_is_known(self) -> bool:
+        """Tells whether nothing speaks for the other sign."""
+        return self.pushes_back is not False and self.passivity != "other sign"
 
     def as_data(self) -> dict[str, Any]:
         entries = asdict(self)
@@ -212,11 +220,11 @@ def make_outcome(
     if of := booking.force:
         own = ElementOutcome("recorded-force", {}, "recorded force", *books[-1])
         # The sign of a force in a log is known.
-        is_signed = of.passivity == "other sign" and isinstance(recording, LogRecording)
-        word: Passivity = "generated" if is_signed else of.passivity
+        pushes_back = isinstance(recording, LogRecording) or booking.force_sign.pushes_back
+        word: Passivity = "generated" if of.passivity == "other sign" and pushes_back else of.passivity
         # What the contact stored before hides what the force gives to a buzz.
         word = "fed the buzz" if word == "passive" and buzz and buzz.is_fed else word
-        force = ForceOutcome(own, of.naive_J, word, of.excess_J)
+        force = ForceOutcome(own, of.naive_J, word, of.excess_J, pushes_back)
     return Outcome(
         recording,
         elements,

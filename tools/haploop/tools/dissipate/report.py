@@ -34,6 +34,10 @@ _PASSIVITY: dict[Passivity, str] = {
         "whether it is passive cannot be said"
     ),
 }
+_PULLS = (
+    "The recorded force pulls the device the further in, the further in it is. That of a wall or a spring pushes back, "
+    "so of one of these it was recorded with the other sign (then --force-unit -1)."
+)
 _NAIVE = (
     "This is true of a force that is positive along the position and held to the next sample; that of a sensor, or of "
     "a thinned-out recording, is not. What is taken out of the device counts as positive. The sum F v T, v that at the "
@@ -192,7 +196,8 @@ def note_sentences(outcome: Outcome) -> list[str]:
 
 def doubtful(outcome: Outcome) -> list[str]:
     """Returns what stands before the answer: that it may be wrong, and why."""
-    return [*uneven(outcome), *outcome.recording.notes.remarks, *filtered_out(outcome)]
+    pulls = [_PULLS] if outcome.force and outcome.force.pushes_back is False else []
+    return [*uneven(outcome), *outcome.recording.notes.remarks, *pulls, *filtered_out(outcome)]
 
 
 def uneven(outcome: Outcome) -> list[str]:

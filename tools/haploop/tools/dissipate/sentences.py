@@ -110,7 +110,7 @@ def buzz_sentence(outcome: Outcome) -> str:
         told = {"at": of.frequency_Hz, "width": amount(of.width_m, "m"), "count": amount(of.count_m, "m")}
         words = _HIDDEN.format(**told, counts=COUNTS)
     if outcome.buzz:
-        sign_is_known = not outcome.force or outcome.force.passivity != "other sign"
+        sign_is_known = not outcome.force or outcome.force.sign_is_known
         return words + _course(outcome.buzz) + _fed(outcome.buzz, sign_is_known)
     if several:
         return words + _NOT_FED * bool(outcome.force)
