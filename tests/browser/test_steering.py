@@ -77,6 +77,26 @@ def test_a_swap_sends_kind_where_it_acts_and_its_parameters_and_the_answer_is_to
 
 
 @pytest.mark.slow
+def test_what_an_element_becomes_may_be_chosen_before_which_one(stand_in, page):
+    page.select_option("#swap-kind", "unidirectional-inertia")
+    page.fill("#swap-mass", "0.02")
+    page.select_option("#swap-element", "0")
+    swapped = order(stand_in, page, lambda: page.click("#swap-do"))
+    assert (swapped[1]["element"], swapped[1]["swap"]["kind"]) == (0, "unidirectional-inertia")
+    assert swapped[1]["swap"]["mass"] == 0.02
+
+
+@pytest.mark.slow
+def test_notes_on_a_change_are_told_without_the_words_for_a_terminal_and_move_no_chart(stand_in, page):
+    before = page.locator("main").bounding_box()
+    note = "wall.stiffness is 1e+08 N/m; is that the unit that was meant? " * 8
+    stand_in.answer = lambda command: (True, f"set wall.stiffness; to go back: set wall.stiffness=1\n{note}")
+    page.click("#pause")
+    expect(page.locator("#said")).to_have_text(f"set wall.stiffness. {note}".strip())
+    assert page.locator("main").bounding_box() == before
+
+
+@pytest.mark.slow
 def test_one_can_be_added_past_the_end_and_one_removed(stand_in, page):
     page.select_option("#swap-element", "2")
     assert "none" not in page.locator("#swap-kind option").evaluate_all("all => all.map(o => o.value)")

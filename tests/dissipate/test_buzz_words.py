@@ -37,6 +37,29 @@ def test_the_buzz_is_the_first_thing_said_also_without_an_element(recording: Pat
     assert data["buzz"]["frequency_Hz"] == pytest.approx(31.0, abs=1.0) == data["main_Hz"]
 
 
+def test_a_slower_swing_is_told_beside_a_buzz_though_the_buzz_comes_first(tmp_path: Path) -> None:
+    found = outcome(write(tmp_path / "both.csv", {"t": S, "x": swing(9.0, 1e-4) + swing(83.0, 2e-5)}))
+    said = shown(make_report(found), 600)
+    assert said.startswith("The recording buzzes: it swings at 83.0 Hz")
+    assert "It also swings at 9.0 Hz (give or take 0.5 Hz), 20" in said
+    alone = outcome(write(tmp_path / "one.csv", {"t": S, "x": counted(swing(31.0, 2.6e-4) * (S > 2.0) - 1e-3 * S)}))
+    assert "also swings" not in shown(make_report(alone), 600)
+
+
+def test_where_gaps_leave_only_short_parts_that_swing_that_no_buzz_was_seen_is_not_all_that_is_said(
+    tmp_path: Path,
+) -> None:
+    swings = swing(83.0, 4e-4) * (S > 1.5)
+    cut = [part for first in (1.4, 2.1, 2.8, 3.5) for part in (first, first + 0.04)]
+    kept = ~((cut[0] < S) & (cut[1] > S) | (cut[2] < S) & (cut[3] > S) | (cut[4] < S) & (cut[5] > S))
+    kept &= ~((cut[6] < S) & (cut[7] > S))
+    said = shown(make_report(outcome(write(tmp_path / "gaps.csv", {"t": S[kept], "x": swings[kept]}))), 600)
+    assert said.startswith("No swing above 15 Hz was seen")
+    assert "Parts between gaps that last less than 1 s, 2.44 s in all, are too short to tell" in said
+    whole = shown(make_report(outcome(write(tmp_path / "whole.csv", {"t": S, "x": 0.0 * S + 1e-4 * S}))), 600)
+    assert "too short to tell" not in whole
+
+
 @pytest.mark.parametrize("dampings", [[], ["2"]])
 def test_the_figure_marks_when_and_at_how_many_hertz_it_buzzes(tmp_path: Path, dampings: list[str]) -> None:
     x = swing(45.0, 3e-4) * (S < 1.5) + swing(110.0, 2e-4) * (S > 2.5)

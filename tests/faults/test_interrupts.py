@@ -93,6 +93,22 @@ def test_the_first_signal_ends_a_run_in_one_process_in_order_too(number, launche
     assert replay(out).differences == []
 
 
+@pytest.mark.slow
+def test_one_signal_is_enough_for_a_run_in_one_process_whose_element_does_not_come_back(launched, tmp_path):
+    (tmp_path / "loops.py").write_text(
+        "from haploop.controller.dissipation import Element\n\nclass Loops(Element):\n    kind = 'loops'\n\n"
+        "    def force(self, motion):\n        if motion.x < -0.06:\n            print('loops')\n"
+        "        while motion.x < -0.06:\n            pass\n        return 0.0\n"
+    )
+    out = tmp_path / "out"
+    words = ["--plugin", str(tmp_path / "loops.py"), "--set", 'dissipation=[{kind="loops"}]']
+    run = launched("run", str(SCENE), *words, "--set", "run.deadline=0.5", "--in-process", out=out)
+    wait_for("the loop", lambda: "loops" in run.stderr)
+    run.signal(signal.SIGTERM)
+    run.end(1)
+    assert "Interrupted at once; what was logged is in" in run.stderr
+
+
 @pytest.mark.parametrize(
     "moment",
     [

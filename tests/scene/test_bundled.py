@@ -2,6 +2,7 @@
 
 import json
 import re
+import resource
 import tomllib
 from pathlib import Path
 
@@ -80,6 +81,30 @@ def test_a_sweep_is_found_by_its_name_and_names_its_scene_so():
     assert sweep_file.load(Path("mine.toml")).base.title.startswith("Fig. 6(b)")
 
 
+def test_a_sweep_that_is_taken_for_a_scene_is_said_to_be_one_and_nothing_else_is():
+    Path("mine.toml").write_text('scene = "fig6b"\n[axes]\n"wall.stiffness" = [100, 200]\n')
+    said, rest = call("run", "mine.toml").stderr.splitlines()
+    assert rest == "1 mistake; nothing was started."
+    assert said == (
+        "mine.toml:2: axes is a key of a sweep, not of a scene. A sweep is run by haploop sweep mine.toml; it names a "
+        "scene and says what is varied in it."
+    )
+
+
+def test_a_scene_that_could_not_be_written_whole_is_not_left_behind():
+    """As on a disk that is full."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))
+    try:
+        refused = call("new", "first.toml", "--device", "premium15")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert refused.exit_code == 1
+    assert "first.toml cannot be written: " in refused.stderr
+    assert not Path("first.toml").exists()
+    assert call("new", "first.toml", "--device", "premium15").exit_code == 0
+
+
 @pytest.mark.parametrize(
     ("name", "told"),
     [
@@ -87,6 +112,12 @@ def test_a_sweep_is_found_by_its_name_and_names_its_scene_so():
             "premium_tip",
             "There is no such file, and no scene of that name comes with haploop; did you mean premium_tap?",
         ),
+        (
+            "premium15",
+            "no scene of that name comes with haploop. premium15 is a device: haploop advise "
+            "premium15 says which walls it bears, haploop new NAME.toml --device premium15 writes a scene with it.",
+        ),
+        ("elements", "comes with haploop. elements is a sweep: haploop sweep elements."),
         ("some/fig6c.toml", "There is no such file; did you mean fig6c?"),
         ("../scenes/fig6c.toml", "There is no such file; did you mean fig6c?"),
         ("x" * 5000, "The file cannot be read: File name too long."),

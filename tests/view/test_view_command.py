@@ -132,6 +132,20 @@ def test_run_with_view_ends_with_its_page_where_asked(launched, tmp_path, monkey
 
 
 @pytest.mark.slow
+def test_a_page_that_is_closed_while_its_run_goes_on_leaves_in_silence(launched, tmp_path, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    words = ["--set", "duration=6", "--view", "--until-closed", "--json"]
+    run = launched("run", str(SCENE), *words, out=tmp_path / "out")
+
+    async def play(tab: Tab) -> dict[str, Any]:
+        return await tab.phase("running")
+
+    browse(run, play)
+    assert '"ended": "done"' in run.end(0)
+    assert "Fatal Python error" not in run.stderr
+
+
+@pytest.mark.slow
 def test_a_run_waits_for_its_viewer_and_is_shown_however_short_it_is(launched, tmp_path):
     """Twenty ticks at free pace end long before a viewer that started with them."""
     run = launched("run", str(SCENE), "--set", "duration=0.02", "--view", "--pace", "free", out=tmp_path / "out")

@@ -227,6 +227,12 @@ def spans(scene: Scene, changes: Iterable[Change]) -> list[Span]:
     return found
 
 
+def happened_at(tick: int, event: Event) -> int:
+    """Returns the tick at which an event on record at a tick took effect: earlier for a swap that was taken back."""
+    taken_back = refused_change(event) if "restored" in event else None
+    return taken_back.tick if taken_back else tick
+
+
 def at_work(scene: Scene, changes: Iterable[Change]) -> Scene:
     return reduce(lambda now, change: change.apply(now), changes, scene)
 

@@ -86,7 +86,8 @@ def _run(source: str, origin: str) -> ModuleType:
         if isinstance(error, SyntaxError) and error.filename == origin and error.lineno:
             lines = [error.lineno]
         line = f", line {lines[-1]}" if lines else ""
-        raise PluginError(f"The plugin {origin}{line} does not load: {type(error).__name__}: {error}") from error
+        what = error.msg if isinstance(error, SyntaxError) and line else error
+        raise PluginError(f"The plugin {origin}{line} does not load: {type(error).__name__}: {what}") from error
     return module
 
 

@@ -46,8 +46,11 @@ def read_source(path: Path) -> str:
         if not stat.S_ISREG(status.st_mode) or status.st_size > _LARGEST:
             raise PluginError(f"The plugin {path} does not load: a Python file of at most 1 MiB was expected.")
         return path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise PluginError(f"The plugin {path} does not load: there is no such file.") from error
     except (OSError, ValueError) as error:
-        raise PluginError(f"The plugin {path} does not load: {type(error).__name__}: {error}") from error
+        why = getattr(error, "strerror", None) or f"{type(error).__name__}: {error}"
+        raise PluginError(f"The plugin {path} does not load: {why}.") from error
 
 
 class PluginTrial:

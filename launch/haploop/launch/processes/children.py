@@ -214,22 +214,32 @@ def share_cores(run_number: int) -> tuple[list[int] | None, list[int] | None]:
 
 
 @contextlib.contextmanager
-def interrupts(usual_from: int) -> Iterator[list[int]]:
-    """Collects SIGINT and SIGTERM in a list; from number ``usual_from`` on, from 1, they raise KeyboardInterrupt."""
+def interrupts(usual_from: int, patience_s: float = 0.0) -> Iterator[list[int]]:
+    """Collects SIGINT and SIGTERM in a list; from number ``usual_from`` on, from 1, they raise KeyboardInterrupt.
+
+    So does SIGALRM, which comes ``patience_s`` after the first, if any, unless ``heeded`` is called before.
+    """
     received: list[int] = []
 
     def note(number: int, _frame: Any) -> None:
         received.append(number)
-        if len(received) >= usual_from:
+        if len(received) >= usual_from or number == signal.SIGALRM:
             raise KeyboardInterrupt
+        signal.setitimer(signal.ITIMER_REAL, patience_s)
 
     try:
-        before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+        before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)}
     except ValueError:  # not in the main thread: signals are somebody else's business
         yield received
         return
     try:
         yield received
     finally:
+        heeded()
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def heeded() -> None:
+    """Takes back the SIGALRM of ``interrupts``: the signal before it was heeded."""
+    signal.setitimer(signal.ITIMER_REAL, 0.0)

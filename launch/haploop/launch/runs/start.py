@@ -147,17 +147,23 @@ def run(
             discard(spec.out, spec.is_new)  # where it never began
             raise
         return _judged(spec, *made)
-    from haploop.launch.processes.children import interrupts
+    from haploop.launch.processes.children import heeded, interrupts
     from haploop.launch.runs.in_process import run_in_process
 
-    with interrupts(usual_from=2) as received:
+    with interrupts(usual_from=2, patience_s=spec.scene.run.deadline) as received:
+
+        def stop() -> bool:
+            if received:
+                heeded()
+            return bool(received)
+
         return run_in_process(
             spec.scene,
             _with_code(spec),
             out=spec.out,
             attachments=spec.attachments,
             on_progress=spec.on_progress,
-            stop=lambda: bool(received),
+            stop=stop,
         )
 
 

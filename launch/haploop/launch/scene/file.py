@@ -19,6 +19,8 @@ from haploop.protocol.scene.scene import Scene
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
+_A_SWEEP = "A sweep is run by haploop sweep {}; it names a scene and says what is varied in it."
+
 
 def load(
     path: Path | str,
@@ -54,6 +56,9 @@ def resolved(
         SceneError: the scene cannot be run; it holds every mistake.
         PluginError: what it names of a plugin file gives no number.
     """
+    if "axes" in layers.data:
+        layers.complain(("axes",), _A_SWEEP.format(layers.path), "is a key of a sweep, not of a scene")
+        raise SceneError(layers.mistakes)
     lay_overrides(layers, overrides)
     layers.data.setdefault("title", layers.path.stem)
     put_in_full(layers)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypedDict
 import numpy as np
 
 from haploop.logger.summary import finite
-from haploop.protocol.changes import KINDS, Event, describe
+from haploop.protocol.changes import KINDS, Event, describe, happened_at
 from haploop.protocol.transport.wire import Message
 from haploop.view.receive.run_session import RunSession
 
@@ -167,7 +167,8 @@ class EventLine(TypedDict):
 def event_lines(events: Iterable[tuple[int, Event]], rate: int, units: Mapping[str, str]) -> list[EventLine]:
     """Returns the newest of these events as lines; ``units`` as in :func:`haploop.protocol.changes.describe`."""
     lines: list[EventLine] = []
-    for tick, event in events:
+    for on_record, event in events:
         if kind := next((kind for kind in KINDS if kind in event), None):
+            tick = happened_at(on_record, event)
             lines.append({"tick": tick, "t_s": tick / rate, "kind": kind, "text": describe(event, units)})
     return lines[-_MOST_EVENTS:]

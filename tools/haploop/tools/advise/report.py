@@ -39,7 +39,10 @@ _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
 _SOME_HOLDS = "at some holds of its hand"
 _ADDS = "of advice.toml, haploop run says beside its verdict: {0}"
 _PUSHED = "the pushes of that verdict are at some holds of its hand, the safe wall was tried at all of them"
-_KICK = "of the encoder the element's force jumps by up to {0}: grit in a slow press, which is no swing"
+_KICK = (
+    "of the encoder the element's force jumps by up to {0}, as far back, and the wall's by a step more: grit of some "
+    "twice that peak to peak in a slow press, which is no swing"
+)
 _ALONE = "{0} without one, searched and attacked alike"
 # What is assumed, how much that costs, and what to measure.
 _ASSUMED = "{0}, neither measured nor published: the wall bears half and twice of {1}. {2}"

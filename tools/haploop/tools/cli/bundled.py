@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shlex
 from pathlib import Path
 from typing import Annotated
@@ -77,6 +78,8 @@ def new(
         except FileExistsError:
             leave(f"{file} is there already; name a file that is not.", WRONG_USE)
         except OSError as error:
+            with contextlib.suppress(OSError):  # of which nothing is left, as a full disk leaves it
+                file.unlink()
             leave(f"{file} cannot be written: {error.strerror}.", FAILED)
         try:
             load(file)

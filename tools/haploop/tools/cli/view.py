@@ -113,7 +113,8 @@ def _at_eof(loop: asyncio.AbstractEventLoop, act: Callable[[], None]) -> None:
     """Acts once nothing can come from stdin any more: whoever started this process has ended."""
 
     def wait() -> None:
-        sys.stdin.buffer.read()
+        while os.read(sys.stdin.fileno(), 1 << 10):  # not by its buffer, whose lock would be held as Python ends
+            pass
         with contextlib.suppress(RuntimeError):  # the loop has ended by itself
             loop.call_soon_threadsafe(act)
 

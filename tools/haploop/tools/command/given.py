@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from haploop.launch.plan.meant.rule import Note
     from haploop.protocol.scene.scene import Scene
 
+_OWN = "haploop.controller."
+_IN_PLACE = "Note: the element {0} is that of a plugin, in place of the installed one."
+
 
 def kinds_with(plugins: list[Path]) -> dict[str, type[Element]]:
     """Returns the installed elements and those of some files."""
@@ -34,9 +37,14 @@ def print_notes(
 
     With the file it was read from, and what was laid over that, each begins with the file and line it speaks of.
     """
+    from haploop.controller.dissipation.registry import installed
     from haploop.launch.plan.effects import notes
     from haploop.launch.scene.file import places
 
+    named = {table.name for table in (*scene.dissipation, *(event.swap for event in scene.event if event.swap))}
+    of_files = [name for name in sorted(named & kinds.keys()) if not kinds[name].__module__.startswith(_OWN)]
+    for name in of_files and sorted({*of_files} & installed().keys()):
+        print(_IN_PLACE.format(name), file=sys.stderr)
     found = notes(scene, kinds)
     where = places(path, overrides, [note.key for note in found]) if path and found else [""] * len(found)
     for note, place in zip(found, where, strict=True):

@@ -28,6 +28,10 @@ _NO_BOUND = (
     "Force bounding is left out: of any wall that is pressed slowly it holds 2 b / T, b the damping that the device "
     "declares, here {0}."
 )
+_ONE_DEVICE = (
+    "One device was expected, whose stabilizers are compared, but {0} and {1} were given. What differs between two "
+    "runs is told by haploop diff {0} {1}, and drawn by haploop plot {0} {1}."
+)
 ROWS, COMPARISON, FIGURE = "rows.jsonl", "comparison.json", "comparison.png"
 
 if TYPE_CHECKING:
@@ -37,6 +41,7 @@ if TYPE_CHECKING:
 
 def compare(
     device: Device,
+    more: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
     hand: Hand = None,
     delay: Delay = None,
     estimator: Estimator = None,
@@ -61,6 +66,8 @@ def compare(
     from haploop.tools.advise.subject import InvalidRequest, make_subject
     from haploop.tools.command.given import kinds_with
 
+    if more:
+        leave(_ONE_DEVICE.format(device, more[0]), WRONG_USE)
     if workers is not None and workers < 1:
         leave(f"--workers must be at least 1, but {workers} was given.", WRONG_USE)
     with plain_errors():

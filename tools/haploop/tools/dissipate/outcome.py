@@ -106,8 +106,9 @@ class Outcome:
         left_out: a line that was taken for the shape of a slower motion, where no buzz was seen.
         several: swings at several frequencies at once, where there was no buzz at one.
         fast_rms_m: by how much it moves above 15 Hz, r.m.s., for a second or more.
+        short_s: how long parts between gaps lasted together that were too short for a buzz to be seen in.
         hidden: a swing within the counts of the positions, because of which it cannot be said whether it buzzes.
-        slower: a swing at one frequency from some 3 Hz up to that of a buzz, where no buzz was seen.
+        slower: a swing at one frequency from some 3 Hz up to that of a buzz, where there were not several.
     """
 
     recording: Recording
@@ -123,6 +124,7 @@ class Outcome:
     several: Several | None = None
     slower: Buzz | None = None
     fast_rms_m: float = 0.0
+    short_s: float = 0.0
     hidden: Hidden | None = None
     tried: tuple[ElementOutcome, ...] = ()
 
@@ -237,8 +239,9 @@ def make_outcome(
         found.slow,
         None if buzz or several else found.overtone(),
         several,
-        None if buzz or several or not found.slower else found.slower.buzz(),
+        None if several or not found.slower else found.slower.buzz(),
         found.fast_rms_m(),
+        found.short_s,
         None if buzz or several else found.hidden.found,
     )
 

@@ -29,6 +29,11 @@ _BUZZ: dict[Word, str] = {
         "second."
     ),
 }
+_SHORT = (
+    " Parts between gaps that last less than {lasts:g} s, {short} in all, are too short to tell: a buzz may be in them."
+)
+# Less of them is not worth a sentence.
+_LEAST_SHORT_S = 0.1
 _HIDDEN = (
     "Whether the recording buzzes cannot be said: a swing at {at:.1f} Hz, {width} peak to peak, would be felt, but it "
     "is within {counts} counts of the positions, {count} each, as their staircase may be. Record with a finer encoder."
@@ -57,8 +62,9 @@ _EITHER = (
 )
 _NEITHER = " The recorded force neither fed this swing nor took from it, but for a hundredth of what went to and fro."
 _SLOWER = (
-    " It swings at {frequency}, {width} peak to peak at most, {when}: slower than the {above:g} Hz from which on it is "
-    "called a buzz; a hand's own motion, its tremor or a slow limit cycle, which a recording alone cannot tell apart."
+    " It {also}swings at {frequency}, {width} peak to peak at most, {when}: slower than the {above:g} Hz from which "
+    "on it is called a buzz; a hand's own motion, its tremor or a slow limit cycle, which a recording alone cannot "
+    "tell apart."
 )
 _FAST = (
     " Without a frequency it moves by {rms} r.m.s. above {above:g} Hz for a second or more: so do a hand's fast "
@@ -111,15 +117,16 @@ def buzz_sentence(outcome: Outcome) -> str:
         words = _HIDDEN.format(**told, counts=COUNTS)
     if outcome.buzz:
         sign_is_known = not outcome.force or outcome.force.sign_is_known
-        return words + _course(outcome.buzz) + _fed(outcome.buzz, sign_is_known)
+        return words + _course(outcome.buzz) + _fed(outcome.buzz, sign_is_known) + _slower(outcome, "also ")
     if several:
         return words + _NOT_FED * bool(outcome.force)
     rms_m = outcome.fast_rms_m
     is_beyond_noise = rms_m > _BEYOND_NOISE * (outcome.noise_m or 0.0)
     if outcome.buzz_word == "none seen" and is_beyond_noise and is_felt(2.0 * math.sqrt(2.0) * rms_m, ABOVE_HZ):
         words += _FAST.format(rms=amount(rms_m, "m"), **limits)
-    if outcome.slower:
-        words += _SLOWER.format(**limits | _told(outcome.slower))
+    if outcome.buzz_word == "none seen" and outcome.short_s > _LEAST_SHORT_S:
+        words += _SHORT.format(short=amount(outcome.short_s, "s"), lasts=LASTS_S)
+    words += _slower(outcome)
     if (slow := outcome.slow) and not (outcome.slower and slow.frequency_Hz > SLOWER.above_Hz):
         words += _HAND.format(main=slow.frequency_Hz, width=amount(slow.width, "m"))
     if not (left := outcome.left_out):
@@ -127,6 +134,11 @@ def buzz_sentence(outcome: Outcome) -> str:
     numbers = {"at": left.line.frequency_Hz, "width": amount(left.line.width, "m")}
     numbers |= {"order": left.order, "of": left.slower_Hz}
     return words + _LEFT_OUT.format(**numbers)
+
+
+def _slower(outcome: Outcome, also: str = "") -> str:
+    slower = outcome.slower
+    return _SLOWER.format(**_told(slower), above=ABOVE_HZ, also=also) if slower else ""
 
 
 def buzzing(outcome: Outcome) -> list[tuple[float, float, str]]:

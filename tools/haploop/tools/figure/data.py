@@ -12,7 +12,7 @@ import numpy as np
 from haploop.launch.runs.run_files import recorded_log, recorded_scene, recorded_summary
 from haploop.launch.spec import PLUGINS
 from haploop.logger.summary import Summary
-from haploop.protocol.changes import Event, Span, changes_of, spans
+from haploop.protocol.changes import Event, Span, changes_of, happened_at, spans
 from haploop.protocol.scene.scene import ElementTable, Scene, Wall
 from haploop.tools.figure.scene_units import declared_units, element_units
 
@@ -156,7 +156,7 @@ class RunData:
         forces = {name: motion[name] for name in ("actuator", "friction") if name in motion}
         if plant and scene.actuator:
             forces.setdefault("actuator", plant["force"])
-        events = log.get("/events", [])
+        events = [_as_happened(event, scene.clock.control_rate) for event in log.get("/events", [])]
         plugins = [data.decode(errors="replace") for name, data in log.attachments.items() if name.startswith(PLUGINS)]
         return cls(
             scene=scene,
@@ -279,3 +279,10 @@ def _no_log(directory: Path) -> str:
     if scene and scene.run.log == "none":
         return f'The run in {directory} was made with run.log = "none" and kept no log; run it again with "steps".'
     return f"The directory {directory} holds no log.mcap; it is not the directory of a logged run."
+
+
+def _as_happened(event: Event, rate: int) -> Event:
+    """Returns an event of a log with the time at which it took effect, s."""
+    on_record = int(event.get("tick", 0))
+    tick = happened_at(on_record, event)
+    return event if tick == on_record else {**event, "timestamp": tick / rate}

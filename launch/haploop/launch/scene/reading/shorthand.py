@@ -45,7 +45,8 @@ def _count_range(layers: Layers) -> None:
     if "resolution" in encoder:
         layers.complain(("encoder", "resolution"), expected, "stands beside bits or range")
     count_m = read["range"] / 2 ** read["bits"] if len(read) == 2 else encoder.get("resolution", 1.0)
-    layers.lay({"resolution": count_m}, layers.origin(("encoder",)), ("encoder",))
+    given = next((name for name in names if name in encoder), "resolution")
+    layers.lay({"resolution": count_m}, layers.origin(("encoder", given)), ("encoder",))
 
 
 _IN_BITS, _IN_COUNTS = " {0} counts are {1} bits.", ' {0} counts over 0.2 m are resolution = "0.2 m / {0}".'

@@ -96,14 +96,23 @@ def _with_the_first(path: Path, text: str, doubled: list[Mistake]) -> Tables | N
     return found.data
 
 
+_OTHERS = {
+    "scenes": "{0} is a scene: haploop run {0}.",
+    "sweeps": "{0} is a sweep: haploop sweep {0}.",
+    "devices": "{0} is a device: haploop advise {0} says which walls it bears, haploop new NAME.toml --device {0} "
+    "writes a scene with it.",
+    "hands": "{0} is a hand: haploop new NAME.toml --hand {0} writes a scene with it.",
+}
+
+
 def _absent(path: Path, what: str) -> str:
     """Returns the sentence on a file that is not there; its name may have been meant for another, or for a scene."""
-    meant = like(path.stem, f"{what}s", path.parent)
     hint = f", and no {what} of that name comes with haploop" if path.name == str(path) else ""
-    words = f"There is no such file{hint}{f'; did you mean {meant}?' if meant else '.'}"
-    if what != "scene" and path.stem in bundled("scenes"):
-        words += f" {path.stem} is a scene: haploop run {path.stem}."
-    return words
+    for folder, words in _OTHERS.items():
+        if folder != f"{what}s" and path.stem in bundled(folder):
+            return f"There is no such file{hint}. {words.format(path.stem)}"
+    meant = like(path.stem, f"{what}s", path.parent)
+    return f"There is no such file{hint}{f'; did you mean {meant}?' if meant else '.'}"
 
 
 _TOO_DEEP = f"Tables and lists may lie at most {DEEPEST} deep in one another."

@@ -43,5 +43,6 @@ export function say({ ok, text, what = "Refused" }) {
   said.dataset.ok = String(ok);
   said.setAttribute("role", ok ? "status" : "alert");
   // There is a button for what a terminal is told to do to go back.
-  put(said, ok ? text.replace(/; to go back: .*$/, "") : `${what}: ${text}`);
+  const told = text.replace(/; to go back: .*$/m, "").replace(/([^.])\n/g, "$1. ");
+  put(said, ok ? told : `${what}: ${text}`);
 }

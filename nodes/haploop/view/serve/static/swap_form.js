@@ -17,13 +17,16 @@ export class SwapForm {
     this.fields = [];
     this.locked = 0;
     // What people have begun to choose stays while the run goes on; else the form follows the elements at work.
-    this.isBegun = false;
+    this.isBegun = this.isKindChosen = false;
     byId("swap").addEventListener("input", () => {
       this.isBegun = true;
       if (this.locked) this.unlock();
     });
     byId("swap-element").addEventListener("change", () => this.takeElement());
-    byId("swap-kind").addEventListener("change", () => this.takeKind());
+    byId("swap-kind").addEventListener("change", () => {
+      this.isKindChosen = true;
+      this.takeKind();
+    });
     byId("swap").addEventListener("submit", (event) => {
       event.preventDefault();
       this.swap();
@@ -57,9 +60,11 @@ export class SwapForm {
     choices("swap-kind", this.index < this.elements.length ? [...kinds, [REMOVE, "none: remove it"]] : kinds);
   }
 
-  /** Another element is chosen: start from what it is now. */
+  /** Another element is chosen: start from what it is now, unless what it becomes was chosen before. */
   takeElement() {
+    const chosen = byId("swap-kind").value;
     this.offerKinds();
+    if (this.isKindChosen && byId("swap-kind").value === chosen) return;
     const element = this.elements[this.index];
     if (element && element.kind in this.kinds) byId("swap-kind").value = element.kind;
     if (element?.acts) byId("swap-acts").value = element.acts;
@@ -84,7 +89,7 @@ export class SwapForm {
   /** Another run: nothing that was chosen for the last one stays. */
   forget() {
     this.known = "";
-    this.isBegun = false;
+    this.isBegun = this.isKindChosen = false;
   }
 
   /** One order at a time: three clicks are one swap, however long they take one after the other. */
@@ -98,6 +103,7 @@ export class SwapForm {
     byId("swap-do").disabled = true;
     const answer = await this.steering.order("swap", { swap: table, element: this.index }, { quiet: true });
     this.isBegun = !answer.ok;
+    this.isKindChosen &&= !answer.ok;
     if (!answer.ok) refuse(answer.text, this.fields, byId("swap-problem"));
     this.locked = setTimeout(() => this.unlock(), answer.ok ? LOCKED_MS : 0);
   }

@@ -41,6 +41,7 @@ class BuzzFinder:
 
     Attributes:
         longest_s: the longest part without a gap that is not bridged.
+        short_s: how long parts without such a gap lasted together that were too short for a swing that lasts.
         slow: the widest line slower than the band; None of a motion without one.
         slower: beside a buzz, the search for a swing just slower than that.
         hidden: swings that are no wider than a staircase of counts may be.
@@ -53,7 +54,7 @@ class BuzzFinder:
         self.slower = BuzzFinder(period_s, delay_s, SLOWER) if band is FAST else None
         self.rate_Hz = 1.0 / period_s
         self._t_s, self._motion = np.empty(0), np.empty((3, 0))
-        self._begins_s = self.longest_s = 0.0
+        self._begins_s = self.longest_s = self._shorter_s = 0.0
         self.slow: Line | None = None
         # Windows that swing, in stretches without one that does not or has another frequency.
         self._stretches: list[list[Window]] = [[]]
@@ -75,6 +76,7 @@ class BuzzFinder:
         self._whole = len(piece.t_s) + (0 if piece.begins else self._whole)
         if piece.begins and not missing:
             self._part_ends |= self._end_of_part()
+            self._shorter_s = self.short_s
             self._next = 0
             self._t_s, self._motion = np.empty(0), np.empty((3, 0))
             self._begins_s = float(piece.t_s[0])
@@ -101,6 +103,11 @@ class BuzzFinder:
             x_m, true_x_m, force_N = self._motion[:, : self._size]
             self._look(self._t_s[: self._size], x_m, true_x_m, force_N, delay_s)
             self._next = self._size // HOPS
+
+    @property
+    def short_s(self) -> float:
+        lasts_s = float(self._t_s[-1] if len(self._t_s) else self._begins_s) - self._begins_s
+        return self._shorter_s + (lasts_s if lasts_s < LASTS_S - 1e-9 else 0.0)
 
     def _bridged(self, to_s: float) -> int:
         """Returns how many samples are missing in the gap up to this time; 0 where it is not bridged."""
