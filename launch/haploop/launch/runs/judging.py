@@ -68,12 +68,12 @@ def main() -> None:
     SIGALRM ends the process where an exchange takes too long, whatever the code of a plugin does.
     """
     given, plugins, events = pickle.load(sys.stdin.buffer)
-    scene = Scene.from_dict(given)
     with os.fdopen(os.dup(1), "wb") as answers:
         nowhere = os.open(os.devnull, os.O_RDWR)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 0)
         kinds = registry(plugins)
+        scene = Scene.from_dict(given)  # which may name a hand force of a plugin
         finding = find(scene, kinds, events, lambda: signal.setitimer(signal.ITIMER_REAL, _patience_s(scene)))
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         pickle.dump(finding, answers)
