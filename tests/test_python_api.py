@@ -222,6 +222,11 @@ def test_numbers_of_the_summary_come_with_their_units(scene: Scene) -> None:
         assert result.quantity(key).is_compatible_with(unit or "dimensionless"), key
     with pytest.raises(KeyError):
         result.quantity("window.nonsense_m")
+    for name, key in (("force_max", "extremes.force_max_N"), ("Oscillation_m", "window.oscillation_m")):
+        with pytest.raises(KeyError, match=f"did you mean {key}"):
+            result.quantity(name)
+    with pytest.raises(TypeError, match=r"out must be a directory, .* a scene is changed by load\(scene\).set"):
+        run(scene, {"wall.stiffness": 300.0})  # pyright: ignore[reportArgumentType]
     assert repr(result).startswith(f"<{result.verdict}: ")
 
 

@@ -126,7 +126,12 @@ def commands() -> str:
 
     from haploop.tools.cli.app import app
 
-    parts = ["# Commands", GENERATED, "Exit status: 0 done, 1 the run failed or was interrupted, 2 wrong use."]
+    parts = [
+        "# Commands",
+        GENERATED,
+        "Exit status: 0 done, or stopped in order, as by a first Ctrl-C; 1 the run failed or was interrupted at once; "
+        "2 wrong use.",
+    ]
     group: Any = typer.main.get_command(app)
     for name, command in group.commands.items():
         arguments = [one for one in command.params if one.param_type_name == "argument"]

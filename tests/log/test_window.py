@@ -108,6 +108,15 @@ def test_the_rate_at_which_swings_grow_is_that_of_their_envelope(rate):
     assert judged(lambda t: -0.061 + 1e-3 * t, 1.0)[1].growth_1_s is None
 
 
+@pytest.mark.parametrize("hertz", [8.0, 30.0, 194.0])
+def test_the_frequency_of_the_window_is_that_of_its_swings_to_a_hertz_and_a_slow_motion_has_none(hertz):
+    def moving(t):
+        return -0.061 + 1e-3 * np.sin(2.0 * np.pi * hertz * t) + 2e-3 * t
+
+    assert judged(moving, 1.3)[1].frequency_Hz == pytest.approx(hertz, abs=1.0)
+    assert judged(lambda t: -0.061 + 1e-3 * np.sin(3.0 * t), 1.3)[1].frequency_Hz is None
+
+
 @pytest.mark.parametrize("pieces", [1, 3, 100])
 def test_how_the_run_is_cut_changes_nothing(pieces):
     def moving(t):

@@ -117,6 +117,9 @@ def energy(*elements: tuple[str, float], **leak: float) -> dict[str, Any]:
         (energy(("damping", 3e-3), delay_J=-2e-3), "2.00 mJ more than an ideal one would"),
         (energy(("damping", -1e-3), delay_J=-2e-3), "2.00 mJ more than an ideal one would"),
         (energy(("damping", -3e-3), ("inertia", -1e-3), delay_J=-2e-3), "damping gave the device 3.00 mJ, more"),
+        (energy(delay_J=-2e-3) | {"actuator_J": 1.5e-3}, "the actuator's limits kept 1.50 mJ of it back"),
+        (energy(("damping", -3e-3)) | {"actuator_J": 1.5e-3}, "the actuator's limits kept 1.50 mJ of it back"),
+        (energy(delay_J=-2e-3) | {"actuator_J": 1e-5}, "the device moves out."),
         ({"elements": [], "wall": {}}, ""),
     ],
 )  # fmt: skip

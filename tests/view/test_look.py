@@ -292,3 +292,18 @@ def test_the_two_sides_of_a_change_are_kept_also_when_the_history_has_forgotten_
     pair = changes.pair(history)
     assert pair
     assert pair[1] is before
+
+
+@pytest.mark.parametrize(("first", "lacking"), [(0, (950, 1050)), (0, (999, 1050)), (1200, None)])
+def test_a_side_of_a_change_that_was_not_received_is_not_held_and_no_number_that_is_not_finite(first, lacking):
+    """A page that joins late, or skipped ticks of a fast run just before the change."""
+    full, held = history_of(sine(40.0, 1e-3), lambda t: 0.1), History(TIME, 0)
+    for begin, end in ((first, lacking[0]), (lacking[1], 3000)) if lacking else ((first, 3000),):
+        for own, its in zip(held.all_series[:2], full.all_series[:2], strict=True):
+            own.append(begin, dict(zip(its.names, its.rows(its.names, begin, end), strict=True)))
+    held.at_work = full.at_work
+    held.ticks.begin(0)
+    changes = Changes(COUNT_M)
+    changes.note(held, [(1000, {"swap": {"kind": "damping"}})])
+    tick, before, after = changes.pair(held)
+    assert (tick, before, after.sight.word) == (1000, None, "swinging")

@@ -12,7 +12,13 @@ def nearest(name: object, allowed: Iterable[str]) -> str | None:
     """Returns the allowed name closest to ``name``, if one is close."""
     import difflib
 
-    return next(iter(difflib.get_close_matches(str(name), list(allowed), n=1, cutoff=_ALIKE)), None)
+    allowed = list(allowed)
+    whole = difflib.get_close_matches(str(name), allowed, n=1, cutoff=_ALIKE)
+    if whole or "." in str(name):
+        return next(iter(whole), None)
+    # Of a dotted key people name the last part.
+    ends = {one.rpartition(".")[2].lower(): one for one in reversed(allowed) if "." in one}
+    return next((ends[end] for end in difflib.get_close_matches(str(name).lower(), ends, n=1, cutoff=_ALIKE)), None)
 
 
 def meant(name: object, allowed: Iterable[str]) -> str:

@@ -126,7 +126,12 @@ def run(
         PluginError: the processes could not find an element that was given as a class.
         RunFailed: a process was killed, hung or could not go on, or an element raised.
         LogError: the log could not be written.
+        TypeError: ``out`` is no path.
     """
+    if out is not None and not isinstance(out, str | Path):
+        raise TypeError(
+            f"out must be a directory, but {out!r:.60} was given; a scene is changed by load(scene).set(...)."
+        )
     scene = scene if isinstance(scene, LoadedScene) else load(scene)
     if math.isfinite(pace) and not processes:
         raise ValueError(f"A pace of {pace:g} needs the clock of a run as processes; give processes=True too.")

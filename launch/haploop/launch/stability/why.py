@@ -43,7 +43,7 @@ AT_HARDEST = {
     "undecided": " Whether it does at the hand's hardest hold, {hardest_N:.3g} N, could not be told.",
 }
 FRICTIONLESS = {
-    "rests": " It would without its friction, too.",
+    "rests": " Held so it would without its friction, too.",
     "swings on": " Only friction holds it: without, its swing would last or grow.",
     "undecided": " Whether it would without its friction could not be told.",
 }

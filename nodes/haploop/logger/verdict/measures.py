@@ -44,6 +44,8 @@ class Figures(NamedTuple):
         from_s: when the window begins: half a second before the end, or half-way through a run shorter than that.
         oscillation_m: how far the true position moved in it, peak to peak.
         growth_1_s: the r of e^(r t) by which the swings grow; negative: they decay; None where nothing swings.
+        frequency_Hz: half as often as the swings cross the middle of the motion a second, to 1 Hz; None where nothing
+            swings.
         outside_fraction: share of its ticks that are out of contact.
         displayed_stiffness_N_m: mean of total force over penetration, ticks in contact (Choi et al. 2022, V.B.2), but
             those whose penetration is a rounding error of the wall's position; None of none.
@@ -55,6 +57,7 @@ class Figures(NamedTuple):
     from_s: float
     oscillation_m: float
     growth_1_s: float | None
+    frequency_Hz: float | None
     outside_fraction: float
     displayed_stiffness_N_m: float | None
     penetration_mean_m: float | None
@@ -213,8 +216,9 @@ def window_measures(measured: MeasuredColumns, span: Span, rate: int) -> list[Wi
     for crossings, growth, width_m, inside, stiffness_N_m, depth_m, *forces_N in zip(*measured, strict=True):
         # What is `growth` times as wide in the second half of the window follows e^(r t).
         rate_1_s = 2.0 * math.log(growth) / seconds if crossings >= CROSSINGS and growth > 0.0 else None
+        frequency_Hz = crossings / (2.0 * seconds) if crossings >= CROSSINGS else None
         outside = (span.ticks - inside) / span.ticks if span.ticks else 1.0
-        figures = Figures(start_s, width_m, rate_1_s, outside, stiffness_N_m, depth_m, *forces_N)
+        figures = Figures(start_s, width_m, rate_1_s, frequency_Hz, outside, stiffness_N_m, depth_m, *forces_N)
         measures.append(WindowMeasures(inside > 0, crossings, growth, figures))
     return measures
 

@@ -21,6 +21,8 @@ from haploop.view.store.lod_series import LodSeries
 
 # Phase plots show so many periods of a swing, which is looked for in so much time, or all of that time; rows at most.
 _PERIODS, _PHASE_S, _MOST_ROWS = 2.0, 0.4, 8000
+# And so many turns of the position at most.
+_MOST_TURNS = 24
 # Ticks of which a spectrum is made at most, the newest; simulated time of the samples that are heard at once.
 _SPECTRUM_TICKS, _SOUND_S = 2048, 0.25
 # Points of the curve of a wall that is no spring.
@@ -75,11 +77,19 @@ def _last(history: History, series: LodSeries, first: int, end: int) -> tuple[in
 
 
 def _newest_periods(history: History, first: int, end: int) -> int:
-    """Returns the tick from which on two periods of the main swing of the last 0.4 s lie, ``first`` without one."""
+    """Returns the tick from which on two periods of the main swing of the last 0.4 s lie, ``first`` without one.
+
+    There are ``_MOST_TURNS`` turns at most: a buzz under a slow motion would make a ball of wool.
+    """
     found, end = _last(history, history.steps, first, end)
+    if found == end:
+        return first
     rate, n = history.time.control_rate, history.time.steps_per_tick
-    line = main_line(history.steps.rows(("x",), found, end)[0][::n], rate) if found < end else None
-    return max(first, end - math.ceil(_PERIODS * rate / line.frequency_Hz)) if line else first
+    x = history.steps.rows(("x",), found, end)[0][::n]
+    line = main_line(x, rate)
+    first = max(first, end - math.ceil(_PERIODS * rate / line.frequency_Hz)) if line else first
+    turns = found + np.flatnonzero(np.diff(np.sign(np.nan_to_num(np.diff(x)))))
+    return max(first, int(turns[-_MOST_TURNS])) if len(turns) >= _MOST_TURNS else first
 
 
 def _force_position(history: History, first: int, end: int) -> Table | None:

@@ -52,8 +52,11 @@ class Changes:
         seen = see(history, since, end, self._resolution_m)
         if seen is None or first < history.steps.full_from_tick:
             return None
-        n = history.time.steps_per_tick
-        return Half(seen, budget(history, first, end), history.steps.rows(("x", "force"), first, end)[:, ::n])
+        n, traces = history.time.steps_per_tick, history.steps.rows(("x", "force"), first, end)
+        newest = history.steps.rows(("x", "force"), max(first, history.steps.end_tick - 1), history.steps.end_tick)
+        if np.isnan(traces[:, -1]).any() and np.isfinite(newest).all():
+            return None  # not received: what is no number stays so to the end
+        return Half(seen, budget(history, first, end), traces[:, ::n])
 
     def sight(self, history: History) -> Sight | None:
         """Returns what the newest ticks show since the last change; None before there are any."""

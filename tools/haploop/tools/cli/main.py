@@ -18,7 +18,7 @@ _OF_TYPER = 130
 
 
 def main() -> None:
-    """Runs the command line. Exit status: 0 done, 1 the run failed or was interrupted, 2 wrong usage or scene."""
+    """Runs the command line. Exit status: 0 done, or stopped in order; 1 failed or interrupted; 2 wrong use."""
     early: dict[str, Started] = {}
     try:
         signal.signal(signal.SIGTERM, signal.default_int_handler)

@@ -22,6 +22,9 @@ _NOTHING = "{when} the wall moved no energy at all: what moves here is not fed b
 _WALL = (
     "{when} the wall gave the device {energy} more than an ideal one would have, {share:.0f} % of it because {because}."
 )
+# The books of wall and elements are those of the commands, and the actuator has one of its own.
+_LIMITED = " That is by what was commanded: the actuator's limits kept {kept} of it back."
+_KEPT = 0.1
 _ELEMENT = "{when} {element} gave the device {energy}, more than the wall did."
 
 
@@ -34,11 +37,17 @@ def cause(energy: Summary, when: str = "In all") -> str:
     fed = [(-element["true_J"], element["kind"]) for element in energy["elements"] if element["true_J"]]
     most_J, element = max(fed, default=(0.0, ""))
     if most_J > max(0.0, -leak["total_J"]):
-        return _ELEMENT.format(when=when, element=element, energy=amount(most_J, "J"))
+        return _ELEMENT.format(when=when, element=element, energy=amount(most_J, "J")) + _limited(energy, most_J)
     if energy["wall"].get("true_J") == 0.0:  # as where its first force comes after the end
         return _NOTHING.format(when=when)
     if leak["total_J"] >= 0.0 or not (total := sum(given.values())):
         return _NONE.format(when=when)
     most = max(given, key=given.__getitem__)
     share = 100.0 * given[most] / total
-    return _WALL.format(when=when, energy=amount(-leak["total_J"], "J"), share=share, because=_BECAUSE[most])
+    words = _WALL.format(when=when, energy=amount(-leak["total_J"], "J"), share=share, because=_BECAUSE[most])
+    return words + _limited(energy, -leak["total_J"])
+
+
+def _limited(energy: Summary, given_J: float) -> str:
+    kept_J = energy.get("actuator_J") or 0.0
+    return _LIMITED.format(kept=amount(kept_J, "J")) if kept_J > _KEPT * given_J else ""

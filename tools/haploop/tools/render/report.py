@@ -105,11 +105,12 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     ran = f"{summary['duration_s']:g} s, {counted(summary['ticks'], 'tick')}"
     if summary["wall_s"]:
         ran += f", in {amount(summary['wall_s'], 's')} ({fixed(summary['real_time_factor'])} times real time)"
+    at_Hz = f", at about {fixed(hertz, 0)} Hz" if (hertz := window.get("frequency_Hz")) else ""
     figures = [
         ("ran", ran),
         *lateness_rows(summary),
         *program_rows(summary),
-        ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak at its end"),
+        ("oscillation", f"{amount(window['oscillation_m'], 'm')} peak to peak at its end{at_Hz}"),
     ]
     for key, (words, after) in _OF_FORCE.items():
         if (force_N := window.get(key)) is not None and (force_N or key == "force_swing_N"):

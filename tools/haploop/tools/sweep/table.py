@@ -123,6 +123,10 @@ class SweepTable:
     def __len__(self) -> int:
         return len(self.columns[CELL])
 
+    def __repr__(self) -> str:
+        so_far = "" if self.finished else ", not finished"
+        return f"<sweep of {len(self)} cells{so_far}: {', '.join(self.columns)}>"
+
 
 def is_sweep(directory: Path) -> bool:
     """Tells whether a directory is that of a sweep."""

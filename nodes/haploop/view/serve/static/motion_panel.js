@@ -2,7 +2,7 @@
 
 import { amount } from "./amounts.js";
 import { FONT } from "./axes.js";
-import { fitCanvas, make, put, seldom } from "./dom.js";
+import { fitCanvas, make, put } from "./dom.js";
 import { colour } from "./palette.js";
 import { extent, Range } from "./range.js";
 import { newest } from "./snapshot.js";
@@ -18,7 +18,7 @@ export class MotionPanel {
     this.note = make("p", { class: "about" });
     this.range = new Range(1e-4);
     host.append(make("h2", {}, "In motion"), this.canvas, this.note);
-    this.tell = seldom((words) => put(this.note, words));
+    this.tell = (words) => put(this.note, words); // with the picture: words that lag contradict it
     fitCanvas(this.canvas, HEIGHT, () => this.last && this.show(...this.last));
   }
 
@@ -44,6 +44,7 @@ export class MotionPanel {
     bodies.forEach((body, i) => this.body(ctx, body, across(body.at), i, ratio));
     const total = force?.columns.find(({ name }) => name === "total");
     const depth = (bodies[0].at - face) * (wall?.into_wall ?? 0);
+    if (!Number.isFinite(bodies[0].at)) return this.tell("Not received yet.");
     const where = depth > 0 ? `${amount(depth, "m")} inside the wall` : "outside the wall";
     return this.tell(`${Number.isFinite(face) ? where : "no wall"}; ${amount(high - low, "m")} across${total ? `; force ${amount(newest(total), "N")}` : ""}`);
   }

@@ -15,8 +15,7 @@ export class PhaseChart {
    */
   constructor(host, { x, y, least }) {
     this.host = host;
-    this.labels = [x, y];
-    this.ranges = least.map((smallest) => new Range(smallest));
+    this.name({ x, y, least });
     this.legend = new Legend(host, () => this.build());
     this.plot = host.appendChild(make("div", { class: "plot" }));
     this.box = boxOf(this.plot, () => this.resize());
@@ -29,6 +28,17 @@ export class PhaseChart {
       this.isSeen = isSeen;
       this.draw();
     });
+  }
+
+  name({ x, y, least }) {
+    this.labels = [x, y];
+    this.ranges = least.map((smallest) => new Range(smallest));
+  }
+
+  /** Take other axes: their numbers have climbed to other units. */
+  rename(axes) {
+    this.name(axes);
+    this.build();
   }
 
   build() {

@@ -1,12 +1,15 @@
 // The two loops of Choi et al. 2022: force against penetration (Fig. 3) and virtual momentum against velocity (Fig. 4).
 
+import { named } from "./amounts.js";
+import { ClimbingUnit } from "./climbing.js";
 import { PhaseChart } from "./phase_chart.js";
 import { linesFor } from "./palette.js";
 import { dots, line } from "./paths.js";
 import { scaled } from "./snapshot.js";
 
-const MM = 1e3;
 const GRAMS = 1e3;
+// The axes of force and penetration never cover less, m and N.
+const LEAST = [1e-5, 0.01];
 const DOT_PX = 3;
 const NOW_PX = 7;
 const COARSE = "Of this time only the least and greatest of each interval are kept here, so no loop of it; the log has every sample.";
@@ -22,20 +25,31 @@ const LINES = {
 };
 
 const whole = (u, xs, ys) => line(u, xs, ys);
+const largest = (values) => values.reduce((most, value) => Math.max(most, Math.abs(value) || 0), 0);
 const inPixels = (size) => (u, xs, ys) => dots(u, xs, ys, size * devicePixelRatio);
 
 export class PhasePlots {
   constructor(loop, momentum) {
-    this.loop = new PhaseChart(loop, { x: "penetration (mm)", y: "force (N)", least: [0.01, 0.01] });
+    this.units = [new ClimbingUnit("m", "m"), new ClimbingUnit("N", "")];
+    this.loop = new PhaseChart(loop, this.axesOfLoop());
     this.momentum = new PhaseChart(momentum, { x: "velocity (m/s)", y: "momentum (g m/s)", least: [1e-3, 0.01] });
     this.charts = [this.loop, this.momentum];
+  }
+
+  /** Names and least extents of the axes of force and penetration, in the units that serve now. */
+  axesOfLoop() {
+    const [depth, force] = this.units;
+    const least = this.units.map(({ factor }, i) => LEAST[i] * factor);
+    return { x: named("penetration", depth.name), y: named("force", force.name), least };
   }
 
   /** Show the loops among the tables of a snapshot, or say why there is none. */
   show({ tables: { loop, momentum }, coarse }, { wall, elements = [] }) {
     const why = coarse ? COARSE : NONE_HERE;
     const hasInertia = elements.some(({ kind }) => kind.includes("inertia"));
-    const parts = loop ? forceLoop(loop) : [];
+    const climbs = loop ? loop.columns.map(({ values }, i) => this.units[i].serve(largest(values))) : [];
+    if (climbs.some(Boolean)) this.loop.rename(this.axesOfLoop());
+    const parts = loop ? forceLoop(loop, this.units) : [];
     this.loop.show(parts, loop ? (parts.length ? "" : NO_CONTACT) : wall?.into_wall ? why : NO_WALL);
     this.momentum.show(momentum ? momentumLoops(momentum) : [], momentum ? "" : hasInertia ? why : NO_INERTIA);
   }
@@ -51,12 +65,13 @@ export class PhasePlots {
 }
 
 /** Pressing and releasing told apart, beside the wall it should be; what lies outside the wall is left out, an empty list where all does. */
-function forceLoop({ columns, stiffness, curve }) {
-  const [depth, force] = columns.map(({ values }) => values);
+function forceLoop({ columns, stiffness, curve }, [inDepth, inForce]) {
+  const [depth, newtons] = columns.map(({ values }) => values);
+  const force = scaled(newtons, inForce.factor);
   const x = new Float64Array(depth.length);
   let deepest = 0;
   for (let i = 0; i < x.length; i++) {
-    x[i] = depth[i] > 0 || force[i] !== 0 ? depth[i] * MM : NaN;
+    x[i] = depth[i] > 0 || force[i] !== 0 ? depth[i] * inDepth.factor : NaN;
     if (depth[i] > deepest) deepest = depth[i];
   }
   if (!x.some((depth) => depth === depth)) return [];
@@ -66,10 +81,10 @@ function forceLoop({ columns, stiffness, curve }) {
     { key: "releasing", label: "releasing", path: (u, xs, ys) => line(u, xs, ys, (i) => !presses(i)) },
   ].map((part) => ({ ...part, line: LINES[part.key], x, y: force }));
   if (curve) {
-    const ideal = { x: scaled(curve[0], MM), y: curve[1] };
+    const ideal = { x: scaled(curve[0], inDepth.factor), y: scaled(curve[1], inForce.factor) };
     parts.push({ key: "spring", label: "ideal wall, at rest", line: LINES.spring, path: whole, ...ideal });
   } else if (Number.isFinite(stiffness)) {
-    const spring = { x: [0, deepest * MM], y: [0, stiffness * deepest] };
+    const spring = { x: [0, deepest * inDepth.factor], y: [0, stiffness * deepest * inForce.factor] };
     parts.push({ key: "spring", label: "ideal spring", line: LINES.spring, path: whole, ...spring });
   }
   parts.push({ key: "now", label: "", line: LINES.now, path: inPixels(NOW_PX), x: x.slice(-1), y: force.slice(-1) });

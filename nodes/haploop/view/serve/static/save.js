@@ -17,7 +17,7 @@ export function savePicture({ title, run }) {
   const [line, gap, plain] = [TITLE_PX * ratio, GAP * ratio, `${12 * ratio}px sans-serif`];
   ctx.font = plain;
   const parts = charts.map((chart) => {
-    const canvases = [...chart.querySelectorAll("canvas")].filter(({ width, height }) => width && height);
+    const canvases = [...chart.querySelectorAll("canvas")].filter((one) => one.width && one.height && one.getClientRects().length);
     const wide = canvases.reduce((sum, { width }) => sum + width + gap, 0);
     const names = placed(ctx, namesOf(chart), wide, ratio);
     const top = (1 + (names.at(-1)?.row ?? 0)) * line;

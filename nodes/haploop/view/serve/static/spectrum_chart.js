@@ -46,7 +46,7 @@ export class SpectrumChart {
         },
         series: [{}, { stroke: () => colour(side.colour), width: 1.4, auto: false, points: { show: false } }],
         axes: [
-          { ...bottomAxis("frequency (Hz)"), values: (_, splits) => splits.map((hz) => (hz == null ? null : axisNumbers([hz], hz < 1 ? 0.1 : 1)[0])) },
+          { ...bottomAxis("frequency (Hz)"), values: (_, splits) => splits.map((hz) => (isTold(hz) ? axisNumbers([hz], hz < 1 ? 0.1 : 1)[0] : null)) },
           leftAxis(named(side.axis, unit.name)),
         ],
       },
@@ -85,6 +85,9 @@ export class SpectrumChart {
     for (const { range } of this.charts) range.forget();
   }
 }
+
+/** Whether a frequency has its number below: 1, 2 and 5 stand apart on a logarithmic axis, 8 and 10 do not. */
+const isTold = (hz) => hz != null && [1, 2, 5].includes(Math.round(hz / 10 ** Math.floor(Math.log10(hz) + 1e-9)));
 
 /** The main line in words. */
 function told(line, unit) {

@@ -144,7 +144,10 @@ class LogRecording:
         if any(DELAY in (event.set or {}) for event in scene.event):
             remarks.append("The delay changed during the run; the forces are taken to arrive after that of the scene.")
         if scene.actuator not in (None, Actuator()):
-            remarks.append("The forces are those commanded, without what the actuator would have made of them.")
+            remarks.append(
+                "The true energies of the recorded force are those of the force that the actuator applied; all else, "
+                "sampled energies and the elements among it, goes by the forces commanded."
+            )
 
     def samples(self) -> Iterator[Samples]:
         """Yields all samples, a chunk of the log at a time."""
