@@ -305,5 +305,8 @@ def test_a_side_of_a_change_that_was_not_received_is_not_held_and_no_number_that
     held.ticks.begin(0)
     changes = Changes(COUNT_M)
     changes.note(held, [(1000, {"swap": {"kind": "damping"}})])
-    tick, before, after = changes.pair(held)
+    pair = changes.pair(held)
+    assert pair
+    tick, before, after = pair
+    assert after
     assert (tick, before, after.sight.word) == (1000, None, "swinging")

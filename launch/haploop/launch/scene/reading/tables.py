@@ -108,11 +108,12 @@ _OTHERS = {
 def _absent(path: Path, what: str) -> str:
     """Returns the sentence on a file that is not there; its name may have been meant for another, or for a scene."""
     hint = f", and no {what} of that name comes with haploop" if path.name == str(path) else ""
-    for folder, words in _OTHERS.items():
-        if folder != f"{what}s" and path.stem in bundled(folder):
-            return f"There is no such file{hint}. {words.format(path.stem)}"
+    is_of = [folder for folder in _OTHERS if folder != f"{what}s" and path.stem in bundled(folder)]
     meant = like(path.stem, f"{what}s", path.parent)
-    return f"There is no such file{hint}{f'; did you mean {meant}?' if meant else '.'}"
+    if meant and is_of and not meant.startswith(path.stem):  # of two that are alike the one that is there is meant
+        meant = None
+    told = [_OTHERS[folder].format(path.stem) for folder in is_of[:1]]
+    return " ".join([f"There is no such file{hint}{f'; did you mean {meant}?' if meant else '.'}", *told])
 
 
 _TOO_DEEP = f"Tables and lists may lie at most {DEEPEST} deep in one another."
