@@ -310,3 +310,17 @@ def test_a_side_of_a_change_that_was_not_received_is_not_held_and_no_number_that
     tick, before, after = pair
     assert after
     assert (tick, before, after.sight.word) == (1000, None, "swinging")
+
+
+def test_what_swings_without_a_line_has_a_frequency_by_its_crossings_and_what_is_not_seen_to_swing_has_none():
+    """A buzz while a tap is in the wall; a swing within two counts of the encoder."""
+
+    def buzzing(t):
+        tap = np.sin(2.0 * np.pi * 2.0 * t)
+        return 5e-3 * tap + 5e-3 * np.where(tap < 0.0, np.sin(2.0 * np.pi * (60.0 + 40.0 * np.sin(9.0 * t)) * t), 0.0)
+
+    for motion, words in ((buzzing, {"swinging", "growing"}), (sine(7.7, 0.4 * COUNT_M), {"no swing seen"})):
+        seen = see(history_of(motion, lambda t: 0.1), 0, 3000, COUNT_M)
+        assert seen
+        assert seen.word in words
+        assert (seen.frequency_Hz is None) == ("no swing seen" in words)

@@ -14,6 +14,7 @@ from haploop.view.store.history import History
 # ratios of the two halves.
 _LONG = 4
 _DIES, _GROWS = 0.5, 2.0
+_SWINGS = ("dying away", "growing", "swinging")
 # At rest, position stays within so many times what counts as a swing, once to either side; beyond rounding. Force stays
 # within this share of the largest.
 _REST, _RIPPLE, _LEAST_RIPPLE_N = 2.0 + 1e-6, 0.02, 1e-3
@@ -130,6 +131,9 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     so_far_word, word = word, "settling" if so_far else word
     line = main_line(recent[0, ::n], rate) if width > _REST * swing_m else None
     line = line or (main_line(recent[1, ::n], rate) if ripple else None)
+    # What swings without a line does so as often as it crosses its middle.
+    hertz = line.frequency_Hz if line else crossings / (2.0 * seen_s) if so_far_word in _SWINGS else None
+    hertz = None if so_far_word == "no swing seen" else hertz
     why = _WHY[word if so_far else why or word].format(
         window=WINDOW_S, begin=by, seen=seen_s, crossings=crossings, growth=growth, swing_um=swing_m * 1e6,
         width_um=width * 1e6, ripple_N=ripple, most_N=max(ripples)[0],
@@ -137,7 +141,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     swing_now_m = float(min(np.ptp(newest[0]), np.ptp(_flat(newest[0]))))
     return Sight(
         word, why, long_first / rate, end / rate, so_far, swing_now_m, ripple,
-        line.frequency_Hz if line else None, stiffness if inside[first - end :].any() else None,
+        hertz, stiffness if inside[first - end :].any() else None,
         float(np.ptp(newest[1])), so_far_word, rests,
     )  # fmt: skip
 
