@@ -53,7 +53,7 @@ def test_members_of_a_batch_have_the_bits_of_each_alone() -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not importlib.util.find_spec("jax"), reason="needs jax")
-def test_it_compiles() -> None:
+def test_a_compiled_batch_with_an_estimator_of_a_package_agrees_with_each_run_alone() -> None:
     from haploop.launch.runs.in_jax import compiling
     from helpers.runs.compiled import agree, compiled
 

@@ -11,12 +11,12 @@ from haploop.tools.studies.choi2022.device import KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.steadiness import (
     STIFFNESSES,
     WIDEST_M,
+    Presses,
     Range,
     Reached,
     beats,
     finer,
     is_judged_steady,
-    judged_largest,
     largest,
     pressed,
     run_all,
@@ -98,7 +98,7 @@ def test_a_swing_of_which_the_judge_cannot_tell_how_it_goes_on_is_steady_only_if
 @pytest.mark.slow
 def test_the_judge_and_a_long_press_agree_but_near_the_line_between_them() -> None:
     """Damping on a wall that it holds and one that it does not, far from where one begins and the other ends."""
-    best = judged_largest(SETUP, KINDS[1], (2.0,), 3)
+    [best] = Presses(SETUP, KINDS[1], STIFFNESSES.tolist(), [(2.0,)], (3,)).judged()
     soft, hard = (max(best - 500.0, 500.0), best + 1500.0)
     one, two = run_all([pressed(started(SETUP.scene(k, elements_of(KINDS[1], 2.0)), 3)) for k in (soft, hard)])
     assert swing_m(one) <= WIDEST_M < swing_m(two)

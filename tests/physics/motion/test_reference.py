@@ -75,7 +75,7 @@ def test_every_drawn_scene_moves_decides_and_keeps_books_as_the_reference_does(s
 
 @pytest.mark.slow
 @pytest.mark.parametrize("decade", range(3, 6))
-def test_thirty_more_drawn_scenes_do(decade):
+def test_thirty_more_drawn_scenes_move_decide_and_keep_books_as_the_reference_does(decade):
     for seed in range(10 * decade, 10 * decade + 10):
         test_every_drawn_scene_moves_decides_and_keeps_books_as_the_reference_does(seed)
 

@@ -57,6 +57,7 @@ class Swing(NamedTuple):
 
     Attributes:
         watched_s: time since the push.
+        push_N, count_m, inside, stays_inside, smooth: as in ``Pushed``.
         changes, errors: of the logarithm of the width over the second half, small and large, and their standard errors.
         rate_1_s, error_1_s: growth of the one that changes less, and its standard error.
         width_m, most_m: mean and maximum of the widths in the last quarter of both.
@@ -64,6 +65,7 @@ class Swing(NamedTuple):
         moved_m: peak to peak over the last half of either, with its trend.
         at_first, at_last: width after the larger push over that after the smaller, in the first piece and at the last.
         frequency_Hz: of the end.
+        ripple_N: what the command swings by above 30 Hz after the larger push, peak to peak, in the last quarter.
         covers: whether a piece covers periods enough to tell how the swing changes, or its turns tell.
         times_felt: how strong the last quarter of either is, in terms of what is felt.
         settles_s: time after the larger push from which on it stays within 5 % of its way, or within what remains; 0 of

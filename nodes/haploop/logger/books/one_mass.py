@@ -44,6 +44,7 @@ class Steps(NamedTuple):
         force: held, N.
         tau: of the hand's muscles, N.
         rise: by which tau rises over the step, N; None where it rises over none.
+        dx: displacement over the step, m.
     """
 
     x: Any

@@ -63,9 +63,9 @@ class Layout:
 class TextRecording:
     """Reads samples from a text file, a control period apart; between them the device moves in straight lines.
 
-    The period is the median of those at the beginning, that of an even grid where the times are one, rounded, or that
-    of the rate. The times are otherwise used only where
-    samples are missing: a controller that counts its ticks takes no notice of how late each of them is.
+    The period is that of the rate where one is given, else that of an even grid where the times are one, rounded, else
+    the median of the periods at the beginning. Beyond that times count only where samples are missing: a controller
+    that counts its ticks takes no notice of how late each of them is.
     """
 
     between = "straight lines"

@@ -203,11 +203,6 @@ class Presses(NamedTuple):
         return [self.walls[count - 1] if count else 0.0 for count in counts]
 
 
-def judged_largest(setup: Setup, kind: str, size: Sequence[float], start: int) -> float:
-    """Returns the largest stiffness in N/m that a size of an element steadies from a start, by the judge of runs."""
-    return Presses(setup, kind, STIFFNESSES.tolist(), [size], (start,)).judged()[0]
-
-
 def is_judged_steady(result: Summary) -> bool:
     """Tells whether a run that was judged is steady: how wide what remains is, of what does not grow at the wall.
 
