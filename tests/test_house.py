@@ -153,7 +153,7 @@ def test_a_wheel_holds_every_module_scene_sweep_device_hand_reference_and_the_li
     references = {file.relative_to(HOUSE / "tools") for file in HOUSE.glob("tools/haploop/**/references/*.json")}
     assert toml
     assert references
-    page = {file.relative_to(HOUSE / "nodes") for file in HOUSE.glob("nodes/haploop/view/serve/static/*")}
+    page = {file.relative_to(HOUSE / "nodes") for file in HOUSE.glob("nodes/haploop/view/serve/static/**/*.*")}
     assert page
     assert held >= {path.as_posix() for path in modules | toml | references | page}
     assert {name.split("/")[0] for name in held} == {"haploop"}

@@ -86,7 +86,7 @@ def test_own_columns_with_long_names_are_told_in_full(viewport, stand_in, page):
 
 # What stands along the left axis of a chart of one column after each of these, and how far from 0 the axis goes.
 AXES = """async columns => {
-    const { TimeChart } = await import("/static/time_chart.js");
+    const { TimeChart } = await import("/static/charts/time_chart.js");
     const host = document.body.appendChild(document.createElement("section"));
     const options = { label: "", unit: "N s/m", prefix: "", least: 1e-9, zero: false, times: true };
     const chart = new TimeChart(host, options, { measured: [] });

@@ -7,7 +7,7 @@ import pytest
 
 # The points of a path through these values, one a pixel, in a chart as high as 100.
 DRAWN = """async (ys) => {
-    const { line } = await import("/static/paths.js");
+    const { line } = await import("/static/drawing/paths.js");
     const [Own, points] = [globalThis.Path2D, []];
     globalThis.Path2D = class {
         moveTo(x, y) { points.push(["move", x, y]); }

@@ -43,10 +43,21 @@ async def test_the_page_is_there_by_its_two_names_with_strict_headers():
 @scenario
 async def test_the_files_are_those_of_the_page_and_of_uplot_and_no_others():
     async with site(NoRuns()) as here:
-        for name, kind in (("uPlot.iife.js", "text/javascript"), ("uPlot.min.css", "text/css")):
+        js, css = "text/javascript", "text/css"
+        for name, kind in (("uPlot.iife.js", js), ("uPlot.min.css", css), ("charts/time_chart.js", js)):
             async with here.session.get(f"{here.address}/static/{name}") as answer:
                 assert (answer.status, answer.content_type) == (200, kind)
-        for name in ("../guard.py", "..%2fguard.py", "guard.py", "uPlot.mousewheel.js", "", "%00", "static"):
+        for name in (
+            "../guard.py",
+            "..%2fguard.py",
+            "charts/../../guard.py",
+            "charts",
+            "guard.py",
+            "uPlot.mousewheel.js",
+            "",
+            "%00",
+            "static",
+        ):
             assert await status(here, f"/static/{name}") == 404
         assert await status(here, "/nothing") == 404
 

@@ -199,8 +199,11 @@ class StandIn:
         uplot = find_spec("uplot")
         assert uplot
         assert uplot.origin
-        for path in [*STATIC.iterdir(), *(Path(uplot.origin).parent / "static").glob("uPlot.*")]:
-            app.router.add_get(f"/static/{path.name}", self._file(path))
+        of_uplot = Path(uplot.origin).parent / "static"
+        for folder, path in [(STATIC, path) for path in STATIC.rglob("*.*")] + [
+            (of_uplot, path) for path in of_uplot.glob("uPlot.*")
+        ]:
+            app.router.add_get(f"/static/{path.relative_to(folder).as_posix()}", self._file(path))
         self._runner = web.AppRunner(app, shutdown_timeout=0.1)
         await self._runner.setup()
         await web.TCPSite(self._runner, "127.0.0.1", self._port, reuse_address=True).start()

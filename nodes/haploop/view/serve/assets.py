@@ -31,9 +31,9 @@ def _uplot() -> Path | None:
 
 
 def assets() -> dict[str, Path]:
-    """Returns every file the page may ask for, by name; raises MissingExtra without uPlot."""
+    """Returns every file the page may ask for, by its place under /static; raises MissingExtra without uPlot."""
     check_installed()
     folder = _uplot()
     assert folder
-    own = {path.name: path for path in _OWN.iterdir() if path.suffix in TYPES}
+    own = {path.relative_to(_OWN).as_posix(): path for path in _OWN.rglob("*") if path.suffix in TYPES}
     return own | {name: folder / name for name in _OF_UPLOT}

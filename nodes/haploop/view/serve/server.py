@@ -94,7 +94,7 @@ def make_app(viewer: Viewer, guard: Guard, heard: Heard, on_closed: Callable[[],
 
     app = web.Application(middlewares=[only_by_name])
     app.router.add_get("/", file)
-    app.router.add_get("/static/{name}", file)
+    app.router.add_get("/static/{name:.+}", file)
     app.router.add_get("/enter/{key}", enter)
     app.router.add_get("/stream", stream)
     app.on_response_prepare.append(protect)

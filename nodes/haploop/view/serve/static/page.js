@@ -1,25 +1,25 @@
 // The page: what the server tells goes to the charts, tables and forms; what is done with them goes back to it.
 
-import { Charts } from "./charts.js";
+import { Charts } from "./charts/charts.js";
 import { byId, put, seldom } from "./dom.js";
-import { showEvents } from "./events.js";
-import { showHeader } from "./header.js";
+import { showEvents } from "./words/events.js";
+import { showHeader } from "./words/header.js";
 import { listen } from "./keys.js";
 import { Viewport } from "./viewport.js";
-import { marksOf } from "./marks.js";
-import { showNodes } from "./nodes.js";
-import { onSchemeChange } from "./palette.js";
+import { marksOf } from "./drawing/marks.js";
+import { showNodes } from "./words/nodes.js";
+import { onSchemeChange } from "./drawing/palette.js";
 import { decode } from "./snapshot.js";
-import { RunChoice } from "./runs.js";
+import { RunChoice } from "./words/runs.js";
 import { saveData, savePicture } from "./save.js";
 import { Scrubber } from "./scrubber.js";
 import { Sound } from "./sound.js";
-import { SetForm } from "./set_form.js";
-import { allow, obstacle, say, Steering } from "./steering.js";
+import { SetForm } from "./steering/set_form.js";
+import { allow, obstacle, say, Steering } from "./steering/steering.js";
 import { Stream } from "./stream.js";
-import { showSummary } from "./summary.js";
-import { SwapForm } from "./swap_form.js";
-import { TimeControls } from "./time_controls.js";
+import { showSummary } from "./words/summary.js";
+import { SwapForm } from "./steering/swap_form.js";
+import { TimeControls } from "./steering/time_controls.js";
 import { ViewControls } from "./view_controls.js";
 
 let state = { phase: "waiting", nodes: [] };

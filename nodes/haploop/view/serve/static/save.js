@@ -1,7 +1,7 @@
 // What is on the page as files: a picture of its charts, and the numbers that they draw.
 
 import { byId, make } from "./dom.js";
-import { colour } from "./palette.js";
+import { colour } from "./drawing/palette.js";
 
 const GAP = 10;
 const TITLE_PX = 18;

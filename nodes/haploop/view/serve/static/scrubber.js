@@ -1,8 +1,8 @@
 // The whole run as a strip: its position, what changed it, and which part the charts show; dragging shows another.
 
 import { byId, fitCanvas, put, seldom } from "./dom.js";
-import { colour } from "./palette.js";
-import { extent } from "./range.js";
+import { colour } from "./drawing/palette.js";
+import { extent } from "./drawing/range.js";
 
 const HEIGHT = 24;
 const STEPS = 1000;

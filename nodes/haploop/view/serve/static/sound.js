@@ -1,7 +1,7 @@
 // The buzz as sound: the force on the device, sample by sample, as loud as it is; off until it is asked for.
 
 import { byId } from "./dom.js";
-import { say } from "./steering.js";
+import { say } from "./steering/steering.js";
 
 // A force of this size, in N, is as loud as it gets; what stands still is silent.
 const FULL_N = 1;

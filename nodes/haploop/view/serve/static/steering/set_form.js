@@ -1,6 +1,6 @@
 // The form that sets numbers of the running loop: the wall, the delay, the gains of the elements.
 
-import { byId, put } from "./dom.js";
+import { byId, put } from "../dom.js";
 import { Field, firstWrong, refuse } from "./field.js";
 import { Slider } from "./slider.js";
 

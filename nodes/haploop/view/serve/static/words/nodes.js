@@ -1,7 +1,7 @@
 // The nodes of the run: how far each one is, whom it waits for, what it had to skip.
 
-import { programName } from "./amounts.js";
-import { byId, make, put } from "./dom.js";
+import { programName } from "../drawing/amounts.js";
+import { byId, make, put } from "../dom.js";
 
 /** Show the table of nodes; rows are kept and only their texts change. */
 export function showNodes(nodes) {

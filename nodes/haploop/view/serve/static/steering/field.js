@@ -1,7 +1,7 @@
 // One number or choice of a form: its name, unit and bounds, and whether what was typed can be used.
 
-import { plain } from "./amounts.js";
-import { make, put } from "./dom.js";
+import { plain } from "../drawing/amounts.js";
+import { make, put } from "../dom.js";
 
 // Lengths and times are small: shown, and read, in thousandths of their SI unit.
 const SHOWN_AS = { m: ["mm", 1e3], s: ["ms", 1e3] };

@@ -1,9 +1,9 @@
 // A loop: one quantity against another, as in Figs. 3 and 4 of Choi et al. 2022.
 
-import { bottomAxis, leftAxis } from "./axes.js";
-import { boxOf, make, onSight, put } from "./dom.js";
-import { Legend, stroke } from "./legend.js";
-import { extent, Range } from "./range.js";
+import { bottomAxis, leftAxis } from "../drawing/axes.js";
+import { boxOf, make, onSight, put } from "../dom.js";
+import { Legend, stroke } from "../drawing/legend.js";
+import { extent, Range } from "../drawing/range.js";
 
 const NOTHING = new Float64Array(1).fill(NaN);
 const SHAPE = { width: 1, dash: [] };

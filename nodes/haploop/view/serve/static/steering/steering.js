@@ -1,7 +1,7 @@
 // Who may steer, and how an order goes to the run and its answer comes back.
 
-import { byId, put } from "./dom.js";
-import { maySteer } from "./stream.js";
+import { byId, put } from "../dom.js";
+import { maySteer } from "../stream.js";
 
 const WATCHING = "Watching only: open the link that haploop view printed to steer.";
 const REASONS = {
@@ -23,7 +23,7 @@ export function allow(phase, why, stays = false) {
 }
 
 export class Steering {
-  /** @param {import("./stream.js").Stream} stream carries the orders. */
+  /** @param {import("../stream.js").Stream} stream carries the orders. */
   constructor(stream) {
     this.stream = stream;
   }

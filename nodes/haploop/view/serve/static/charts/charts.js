@@ -1,10 +1,10 @@
 // All charts of the page, filled from one snapshot at a time.
 
-import { amount, isNumber } from "./amounts.js";
-import { byId } from "./dom.js";
+import { amount, isNumber } from "../drawing/amounts.js";
+import { byId } from "../dom.js";
 import { Panels } from "./panels.js";
-import { linesOf } from "./palette.js";
-import { times } from "./snapshot.js";
+import { linesOf } from "../drawing/palette.js";
+import { times } from "../snapshot.js";
 import { TimeChart } from "./time_chart.js";
 
 const CHARTS = {
@@ -15,7 +15,7 @@ const CHARTS = {
 const NO_TIMES = new Float64Array(0);
 
 export class Charts {
-  /** @param {import("./viewport.js").Viewport} viewport what is looked at. */
+  /** @param {import("../viewport.js").Viewport} viewport what is looked at. */
   constructor(viewport) {
     this.viewport = viewport;
     this.charts = Object.fromEntries(

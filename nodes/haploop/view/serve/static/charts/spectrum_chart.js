@@ -1,13 +1,13 @@
 // The spectrum of force and position: amplitudes over frequency on two axes, the line that stands out named.
 
-import { amount, axisNumbers, named } from "./amounts.js";
-import { bottomAxis, leftAxis } from "./axes.js";
-import { ClimbingUnit } from "./climbing.js";
-import { boxOf, make, put, seldom } from "./dom.js";
-import { colour } from "./palette.js";
-import { line as linePath } from "./paths.js";
-import { Range, extent } from "./range.js";
-import { scaled, times } from "./snapshot.js";
+import { amount, axisNumbers, named } from "../drawing/amounts.js";
+import { bottomAxis, leftAxis } from "../drawing/axes.js";
+import { ClimbingUnit } from "../drawing/climbing.js";
+import { boxOf, make, put, seldom } from "../dom.js";
+import { colour } from "../drawing/palette.js";
+import { line as linePath } from "../drawing/paths.js";
+import { Range, extent } from "../drawing/range.js";
+import { scaled, times } from "../snapshot.js";
 
 const SIDES = {
   x: { label: "position", axis: "position", unit: "m", prefix: "µ", colour: "accent", least: 1e-7 },

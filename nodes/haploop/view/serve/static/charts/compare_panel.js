@@ -1,9 +1,9 @@
 // Before and after the last change side by side: position and force over half a second each, and what is seen of them.
 
-import { amount, amounts, NONE } from "./amounts.js";
-import { make, put } from "./dom.js";
-import { frequency, SWINGS } from "./header.js";
-import { colour } from "./palette.js";
+import { amount, amounts, NONE } from "../drawing/amounts.js";
+import { make, put } from "../dom.js";
+import { frequency, SWINGS } from "../words/header.js";
+import { colour } from "../drawing/palette.js";
 
 const SIDES = ["before", "after"];
 const TRACES = [["x", "position", "m"], ["force", "force", "N"]];

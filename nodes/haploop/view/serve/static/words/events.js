@@ -1,6 +1,6 @@
 // What changed the run, each at its tick, the newest first; a click shows the moment in the charts.
 
-import { byId, make } from "./dom.js";
+import { byId, make } from "../dom.js";
 
 const AROUND_S = 0.1;
 

@@ -1,7 +1,7 @@
 // What came of a run that has ended: the figures and books of its summary.json.
 
-import { amount, amounts, fixed, isNumber, NONE, programName } from "./amounts.js";
-import { byId, make } from "./dom.js";
+import { amount, amounts, fixed, isNumber, NONE, programName } from "../drawing/amounts.js";
+import { byId, make } from "../dom.js";
 import { isJudged, told } from "./header.js";
 
 const CAUSES = { sampling_and_hold_J: "sampling and hold", quantisation_J: "quantisation", delay_J: "delay" };

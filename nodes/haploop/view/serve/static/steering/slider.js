@@ -1,7 +1,7 @@
 // A slider beside a number above zero: from a tenth to ten times of it, the part beyond the loop's limit shaded.
 
-import { amount, plain } from "./amounts.js";
-import { make, put } from "./dom.js";
+import { amount, plain } from "../drawing/amounts.js";
+import { make, put } from "../dom.js";
 
 const STEPS = 200;
 const DIGITS = 3;

@@ -1,11 +1,11 @@
 // The two loops of Choi et al. 2022: force against penetration (Fig. 3) and virtual momentum against velocity (Fig. 4).
 
-import { named } from "./amounts.js";
-import { ClimbingUnit } from "./climbing.js";
+import { named } from "../drawing/amounts.js";
+import { ClimbingUnit } from "../drawing/climbing.js";
 import { PhaseChart } from "./phase_chart.js";
-import { linesFor } from "./palette.js";
-import { dots, line } from "./paths.js";
-import { scaled } from "./snapshot.js";
+import { linesFor } from "../drawing/palette.js";
+import { dots, line } from "../drawing/paths.js";
+import { scaled } from "../snapshot.js";
 
 const GRAMS = 1e3;
 // The axes of force and penetration never cover less, m and N.

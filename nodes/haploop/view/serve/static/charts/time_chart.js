@@ -1,16 +1,16 @@
 // A chart over simulated time: lines of one unit, the events that changed the run, a cursor shared with its neighbours.
 
-import { amount, named, steady } from "./amounts.js";
-import { bareAxis, bottomAxis, leftAxis } from "./axes.js";
-import { boxOf, make, onSight, seldom } from "./dom.js";
-import { Legend, stroke } from "./legend.js";
-import { drawMarks, drawMeasured, nameMarks } from "./marks.js";
-import { ClimbingUnit } from "./climbing.js";
-import { colour } from "./palette.js";
-import { boxes, drawStrips, halfPlane, line as linePath, strips } from "./paths.js";
-import { extent, Range } from "./range.js";
-import { between, Marked, readingsAt, told } from "./readings.js";
-import { newest, scaled, times } from "./snapshot.js";
+import { amount, named, steady } from "../drawing/amounts.js";
+import { bareAxis, bottomAxis, leftAxis } from "../drawing/axes.js";
+import { boxOf, make, onSight, seldom } from "../dom.js";
+import { Legend, stroke } from "../drawing/legend.js";
+import { drawMarks, drawMeasured, nameMarks } from "../drawing/marks.js";
+import { ClimbingUnit } from "../drawing/climbing.js";
+import { colour } from "../drawing/palette.js";
+import { boxes, drawStrips, halfPlane, line as linePath, strips } from "../drawing/paths.js";
+import { extent, Range } from "../drawing/range.js";
+import { between, Marked, readingsAt, told } from "../drawing/readings.js";
+import { newest, scaled, times } from "../snapshot.js";
 
 const CURSORS = "haploop";
 // Where the charts lie one below the other, each has its times: that of the last is out of sight.
@@ -28,7 +28,7 @@ export class TimeChart {
    * @param {HTMLElement} host takes the chart.
    * @param {object} options label, SI unit and first prefix of the left axis; least: it never covers less, in SI; zero:
    *   it always shows 0; times: whether the times stand below it.
-   * @param {import("./viewport.js").Viewport} viewport what dragging in the chart changes.
+   * @param {import("../viewport.js").Viewport} viewport what dragging in the chart changes.
    */
   constructor(host, options, viewport) {
     Object.assign(this, { host, options, viewport });

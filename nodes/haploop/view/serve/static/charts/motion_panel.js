@@ -1,11 +1,11 @@
 // The loop in motion: wall, device, cable to its motor and hand, to scale along the line on which they move.
 
-import { amount } from "./amounts.js";
-import { FONT } from "./axes.js";
-import { fitCanvas, make, put } from "./dom.js";
-import { colour } from "./palette.js";
-import { extent, Range } from "./range.js";
-import { newest } from "./snapshot.js";
+import { amount } from "../drawing/amounts.js";
+import { FONT } from "../drawing/axes.js";
+import { fitCanvas, make, put } from "../dom.js";
+import { colour } from "../drawing/palette.js";
+import { extent, Range } from "../drawing/range.js";
+import { newest } from "../snapshot.js";
 
 const HEIGHT = 170;
 const LANE = 0.45;

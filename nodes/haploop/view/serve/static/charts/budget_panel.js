@@ -1,7 +1,7 @@
 // Where the energy comes from: a bar for every cause, to the left what feeds the device, to the right what takes from it.
 
-import { amount } from "./amounts.js";
-import { make, put } from "./dom.js";
+import { amount } from "../drawing/amounts.js";
+import { make, put } from "../dom.js";
 
 const MODES = [["total", "since start"], ["window", "window"], ["power", "power"]];
 const STORE = "put into store";

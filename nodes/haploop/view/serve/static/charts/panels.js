@@ -2,7 +2,7 @@
 
 import { BudgetPanel } from "./budget_panel.js";
 import { ComparePanel } from "./compare_panel.js";
-import { beat, byId, seldom } from "./dom.js";
+import { beat, byId, seldom } from "../dom.js";
 import { MotionPanel } from "./motion_panel.js";
 import { OwnPanel } from "./own_panel.js";
 import { PhasePlots } from "./phase_plots.js";
@@ -12,7 +12,7 @@ const LOOPS_MS = 50;
 const NEXT = { ArrowRight: 1, ArrowLeft: -1 };
 
 export class Panels {
-  /** @param {import("./viewport.js").Viewport} viewport is told which panel is shown: only its numbers are sent. */
+  /** @param {import("../viewport.js").Viewport} viewport is told which panel is shown: only its numbers are sent. */
   constructor(viewport) {
     this.viewport = viewport;
     this.panels = {

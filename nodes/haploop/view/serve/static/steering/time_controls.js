@@ -1,6 +1,6 @@
 // The controls of the run's time: pause and resume, step, pace, stop.
 
-import { byId, put } from "./dom.js";
+import { byId, put } from "../dom.js";
 
 export class TimeControls {
   /** @param {import("./steering.js").Steering} steering carries the orders. */

@@ -1,15 +1,15 @@
 // The runs there are: live ones and those that were recorded. One is on show, another may be drawn behind it.
 
-import { plain } from "./amounts.js";
-import { byId, make, put } from "./dom.js";
-import { maySteer } from "./stream.js";
+import { plain } from "../drawing/amounts.js";
+import { byId, make, put } from "../dom.js";
+import { maySteer } from "../stream.js";
 
 const WATCHING = "Watching only: who has the link that haploop view printed chooses the run, for all pages.";
 
 export class RunChoice {
   /**
-   * @param {import("./steering.js").Steering} steering carries the choice: it is that of all pages of this viewer.
-   * @param {import("./viewport.js").Viewport} viewport what is looked at.
+   * @param {import("../steering/steering.js").Steering} steering carries the choice: it is that of all pages of this viewer.
+   * @param {import("../viewport.js").Viewport} viewport what is looked at.
    */
   constructor(steering, viewport) {
     this.viewport = viewport;

@@ -1,6 +1,6 @@
 // The form that swaps a dissipation element: which one, what it becomes, and that kind's parameters.
 
-import { byId, make, put } from "./dom.js";
+import { byId, make, put } from "../dom.js";
 import { Field, firstWrong, refuse } from "./field.js";
 
 const REMOVE = "none";

@@ -1,6 +1,6 @@
 // The names of a chart's lines, each with its number; a click hides a line or brings it back.
 
-import { make, put } from "./dom.js";
+import { make, put } from "../dom.js";
 import { colour } from "./palette.js";
 
 const SVG = "http://www.w3.org/2000/svg";

@@ -1,14 +1,14 @@
 // Own columns of elements over time, as a plugin declares them: a chart for each unit.
 
-import { make, put } from "./dom.js";
-import { linesOf } from "./palette.js";
-import { times } from "./snapshot.js";
+import { make, put } from "../dom.js";
+import { linesOf } from "../drawing/palette.js";
+import { times } from "../snapshot.js";
 import { TimeChart } from "./time_chart.js";
 
 const NOTHING = "No element showed a number of its own in this time.";
 
 export class OwnPanel {
-  /** @param {HTMLElement} host takes the charts. @param {import("./viewport.js").Viewport} viewport what they change. */
+  /** @param {HTMLElement} host takes the charts. @param {import("../viewport.js").Viewport} viewport what they change. */
   constructor(host, viewport) {
     Object.assign(this, { host, viewport });
     this.note = host.appendChild(make("p", { class: "about" }));

@@ -1,7 +1,7 @@
 // The answer at once: the verdict, the state of the run and the numbers that tell how it goes.
 
-import { amount, amountOf, fixed, isNumber, NONE, plain, power, steady } from "./amounts.js";
-import { byId, put, sign } from "./dom.js";
+import { amount, amountOf, fixed, isNumber, NONE, plain, power, steady } from "../drawing/amounts.js";
+import { byId, put, sign } from "../dom.js";
 
 const WORDS = { lost: "not connected" };
 const VERDICTS = new Set(["steady", "limit-cycle", "growing", "diverged", "no-contact", "undecided"]);
