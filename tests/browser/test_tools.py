@@ -234,8 +234,10 @@ def test_a_slider_sets_when_it_is_let_go_and_shades_what_lies_beyond_the_limit(s
     stand_in.state(limit_N_m=300.0)
     slider = page.locator("input[aria-label='wall.stiffness, coarse']")
     expect(slider).to_have_attribute(
-        "title", "Beyond 300 N/m the loop as it is now, without quantisation and noise, is unstable."
+        "title", "Beyond 300 N/m the loop as it is now, without friction, quantisation and noise, is unstable."
     )
+    told = page.locator("#set-fields p:has([id='set-wall.stiffness'])")
+    expect(told).to_contain_text("shaded: unstable, but for friction, quantisation and noise")
     share = float(slider.evaluate("e => e.style.getPropertyValue('--safe')").rstrip("%"))
     assert share == pytest.approx(50 + 50 * 0.30103, abs=0.1), "log10 of 300 over 150"
     slider.focus()
@@ -243,10 +245,8 @@ def test_a_slider_sets_when_it_is_let_go_and_shades_what_lies_beyond_the_limit(s
         page.keyboard.press("ArrowRight")
     coarse = pytest.approx(150 * 10 ** (3 / 200), rel=0.01)
     stand_in.ordered(lambda command: command["arguments"]["set"]["wall.stiffness"] == coarse)
-    stand_in.state(no_limit="not linear, by [friction]")
-    expect(page.locator("#set-fields p:has([id='set-wall.stiffness'])")).to_contain_text(
-        "no limit is shaded: not linear, by [friction]"
-    )
+    stand_in.state(no_limit="not linear, by [jitter]")
+    expect(told).to_contain_text("no limit is shaded: not linear, by [jitter]")
     assert OPTIONS["settable"]["wall.position"]["value"] < 0
     expect(page.locator("input[aria-label='wall.position, coarse']")).to_be_hidden()
 

@@ -190,8 +190,20 @@ def test_a_loop_with_an_element_that_is_not_installed_has_no_limit_of_stiffness(
 
 
 def test_what_makes_a_loop_nonlinear_is_told_beside_an_element_that_is_not_installed():
-    scene = replace(load("demo").scene, dissipation=(ElementTable(name="of a plugin"),))
-    assert LiveRuns().stiffness_limit(scene) == "not linear, by [friction]"
+    scene = load("fig6c").set({"jitter": {"kind": "gamma", "mean": 0.001, "deviation": 0.001}}).scene
+    strange = replace(scene, dissipation=(ElementTable(name="of a plugin"),))
+    assert LiveRuns().stiffness_limit(strange) == "not linear, by [jitter]"
+
+
+def test_of_a_loop_with_friction_the_limit_is_that_without_it():
+    """Where `haploop explain demo` has it, too: the demo's wall, beyond it, buzzes."""
+    scene = load("demo").scene
+    assert scene.friction
+    limit = LiveRuns().stiffness_limit(scene)
+    assert isinstance(limit, float)
+    assert limit == pytest.approx(1668.0, rel=1e-3)
+    assert scene.wall
+    assert scene.wall.stiffness > limit
 
 
 def test_what_cannot_be_read_is_refused_and_what_was_shown_stays(recorded, tmp_path):

@@ -110,13 +110,15 @@ class LiveRuns:
     def stiffness_limit(self, scene: Scene) -> float | str:
         """Returns the largest stiffness with which the linear map of a loop is stable, N/m, or why there is none.
 
-        Plugin files are not read: they are code, and that of a run is at work in the run alone.
+        It is that without friction, which may hold what lies beyond. Plugin files are not read: they are code, and that
+        of a run is at work in the run alone.
         """
         from haploop.controller.dissipation.element import ElementError
         from haploop.protocol.register import UnknownKind
         from haploop.tools.linear.linearity import installed_kinds, why_not_linear
         from haploop.tools.linear.one_tick import NeverStable, OneTickMap
 
+        scene = replace(scene, friction=None)
         known = [table for table in scene.dissipation if table.name in installed_kinds()]
         strange = [table.name for table in scene.dissipation if table not in known]
         try:

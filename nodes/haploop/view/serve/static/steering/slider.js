@@ -27,7 +27,7 @@ export class Slider {
 
   /** The number as it is, and the limit it has, in SI, or why none is known; no slider for a number that is not above zero. */
   show(value, limit = null, why = "") {
-    put(this.why, why ? `no limit is shaded: ${why}` : "");
+    put(this.why, limit ? "shaded: unstable, but for friction, quantisation and noise" : why ? `no limit is shaded: ${why}` : "");
     this.input.hidden = !(value > 0);
     if (this.input.hidden) return;
     if (!this.field.touched && (this.centre === 0 || Math.abs(Math.log10(value / this.centre)) > 0.7)) this.centre = value;
@@ -36,6 +36,6 @@ export class Slider {
     Object.assign(this, { limit, shadedFor: this.centre });
     const share = limit ? 50 + 50 * Math.log10(limit / this.centre) : 100;
     this.input.style.setProperty("--safe", `${Math.min(100, Math.max(0, share))}%`);
-    this.input.title = limit ? `Beyond ${amount(limit, this.field.quantity.unit)} the loop as it is now, without quantisation and noise, is unstable.` : "";
+    this.input.title = limit ? `Beyond ${amount(limit, this.field.quantity.unit)} the loop as it is now, without friction, quantisation and noise, is unstable.` : "";
   }
 }
