@@ -141,6 +141,7 @@ def test_a_page_that_is_closed_while_its_run_goes_on_leaves_in_silence(launched,
         return await tab.phase("running")
 
     browse(run, play)
+    run.says("The page is gone; the run goes on. Where it stands still, haploop resume lets it go on")
     assert '"ended": "done"' in run.end(0)
     assert "Fatal Python error" not in run.stderr
 

@@ -28,6 +28,7 @@ _AT = "The page is at {} ({} ends it)"
 _ENDS = ("Ctrl-C", "closing it")
 _STAYS = "The run is over; its page {} until {}."
 _UNTIL = ("Ctrl-C ends it here", "it is closed, or Ctrl-C ends it here")
+_GONE = "The page is gone; the run goes on. Where it stands still, haploop resume lets it go on, Ctrl-C ends it."
 # A run waits so long for its viewer.
 _HELD_S = 10.0
 # A viewer steps back where a run wants the processor.
@@ -146,6 +147,7 @@ class Viewer:
     def __init__(self, wanted: bool, until_closed: bool) -> None:
         self._wanted, self._until_closed, self._link = wanted, until_closed, ""
         self._process: subprocess.Popen[str] | None = None
+        self._is_over = False
 
     def on_started(self, run_id: str) -> None:
         """Takes the id by which the run can be found from now on."""
@@ -175,9 +177,13 @@ class Viewer:
         self._link = self._process.stdout.readline().strip()
         if self._link:
             print(f"The page is at {self._link}", file=sys.stderr, flush=True)
+        self._process.stdout.read()  # to its end, which is that of the viewer
+        if self._link and not self._is_over:
+            print(_GONE, file=sys.stderr, flush=True)
 
     def stay(self) -> None:
-        """Keeps the page until Ctrl-C, or until it ends by itself; leaves no process behind."""
+        """Keeps the page until Ctrl-C, or until it ends by itself; leaves no process behind. The run is over."""
+        self._is_over = True
         if not (process := self._process):
             return
         with contextlib.suppress(KeyboardInterrupt):

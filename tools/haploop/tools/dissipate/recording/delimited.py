@@ -137,7 +137,10 @@ def _open_lines(path: Path) -> Iterator[Iterator[str]]:
         try:
             yield iter(file)
         except UnicodeDecodeError as error:
-            raise RecordingError(f"The recording {path} must be UTF-8 text, which it is not.") from error
+            raise RecordingError(
+                f"The recording {path} must be UTF-8 text, which it is not; save it as such, or turn it into it: iconv "
+                f"-f CP1252 -t UTF-8 {path.name} > other.csv."
+            ) from error
         except csv.Error as error:
             raise RecordingError(f"The recording {path} is no table: a cell is longer than any number.") from error
 
