@@ -246,7 +246,7 @@ def test_a_node_whose_python_does_not_even_start_ends_the_run_and_is_named(role,
 
 
 BROKEN = {
-    "line 5 does not load: SyntaxError: '[(]' was never closed\n": "class Brake(Element:\n",
+    "line 5 does not load: SyntaxError: [^,]*$": "class Brake(Element:\n",  # the place is told once
     "has no method force": SOUND.replace("def force", "def strength"),
     "no longer defines brake": SOUND.replace('"brake"', '"break"'),
     "cannot be made with damping = 0.05: ValueError: too little": SOUND.replace(
