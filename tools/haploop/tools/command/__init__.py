@@ -1,1 +1,1 @@
-"""What the commands of every tool share: options, the code of plugins, notes, and leaving on Ctrl-C."""
+"""Shared parts of the commands of every tool: options, the code of plugins, notes, and leaving on Ctrl-C."""

@@ -1,4 +1,4 @@
-"""What a command was given: elements of plugin files, and notes on its scene or its recording."""
+"""Elements of the plugin files that a command was given, and notes on its scene or its recording."""
 
 from __future__ import annotations
 
