@@ -5,12 +5,16 @@ from __future__ import annotations
 import io
 from typing import Any
 
+from matplotlib.axis import Axis
 from rich.console import Console
 
 
 def artists(figure: Any, name: str) -> list[Any]:
-    """Everything drawn under a name, in the order of drawing."""
-    return [one for one in figure.findobj() if one.get_gid() == name]
+    """Everything drawn under a name, in the order of drawing; no ticks, which would be made for being looked at."""
+    within = (
+        [] if isinstance(figure, Axis) else [found for one in figure.get_children() for found in artists(one, name)]
+    )
+    return [*within, figure] if figure.get_gid() == name else within
 
 
 def shown(renderable: Any, width: int = 100) -> str:

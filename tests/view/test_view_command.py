@@ -132,7 +132,9 @@ def test_run_with_view_ends_with_its_page_where_asked(launched, tmp_path, monkey
 
 
 @pytest.mark.slow
-def test_of_a_page_that_is_closed_while_its_run_goes_on_one_sentence_tells_and_no_error(launched, tmp_path, monkeypatch):
+def test_of_a_page_that_is_closed_while_its_run_goes_on_one_sentence_tells_and_no_error(
+    launched, tmp_path, monkeypatch
+):
     """The run is longer than the test has patience: however slow the host, it still goes on as the page goes."""
     monkeypatch.delenv("DISPLAY", raising=False)
     words = ["--set", "duration=600", "--view", "--until-closed", "--json"]

@@ -138,13 +138,27 @@ def scene_model(kinds: Mapping[str, type[Element]], named: Mapping[str, Any] | N
 
     Args:
         named: the tables that are there: the model takes what that of the whole scene would take, and is made sooner,
-            without other walls than the spring where it is one.
+            without other walls than the spring where it is one, and without other elements than are in them.
     """
     if named is None:
         return _scene_model(tuple(kinds.items()), None)
-    wall = named.get("wall")
+    wall, asked = named.get("wall"), _kinds_in(named)
     is_plain = isinstance(wall, dict) and wall.keys() <= _SPRING_KEYS
-    return _scene_model(tuple(kinds.items()), frozenset(named), is_plain)
+    asked_for = {kind: element for kind, element in kinds.items() if kind in asked} or kinds
+    return _scene_model(tuple(asked_for.items()), frozenset(named), is_plain)
+
+
+def _kinds_in(tables: Mapping[str, Any]) -> list[Any]:
+    """Returns the kinds of element that stand in tables which may not be in order."""
+    elements, events = (
+        [of for of in _listed(tables.get(key)) if isinstance(of, dict)] for key in ("dissipation", "event")
+    )
+    swaps = [event.get("swap") for event in events]
+    return [of.get("kind") for of in [*elements, *swaps] if isinstance(of, dict)]
+
+
+def _listed(value: Any) -> Sequence[Any]:
+    return value if isinstance(value, list | tuple) else ()
 
 
 @cached_until_brought

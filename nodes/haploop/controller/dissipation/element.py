@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, dataclass_transform, get_args, get_origin, get_type_hints
@@ -209,8 +210,13 @@ class Element(ABC):
         Raises:
             TypeError: a parameter is declared as none of the forms there are.
         """
-        hints = get_type_hints(cls, include_extras=True)
-        return {f.name: (_quantity(cls, f.name, hints[f.name]), f.default) for f in dataclasses.fields(cls)}
+        return dict(_parameters(cls))
+
+
+@lru_cache(maxsize=256)
+def _parameters(cls: type[Element]) -> Mapping[str, tuple[Quantity, Any]]:
+    hints = get_type_hints(cls, include_extras=True)
+    return {f.name: (_quantity(cls, f.name, hints[f.name]), f.default) for f in dataclasses.fields(cls)}
 
 
 def hint_of(quantity: Quantity) -> Any:

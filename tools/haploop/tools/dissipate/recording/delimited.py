@@ -99,8 +99,11 @@ class DelimitedFile:
                 if len(rows) != len(chunk):
                     line = next((n for n, line in chunk if line.count('"') % 2), chunk[0][0])
                     raise RecordingError(f"Line {line} of {self.path}: a quotation mark is not closed.")
-                cells = zip(rows, (n for n, _ in chunk), strict=True)
-                table = np.array([[self._number(row, index, n) for index in wanted] for row, n in cells])
+                try:
+                    table = np.array([[float(row[index]) for index in wanted] for row in rows])
+                except (ValueError, IndexError):  # some cell is empty, missing, in other digits or no number
+                    cells = zip(rows, (n for n, _ in chunk), strict=True)
+                    table = np.array([[self._number(row, index, n) for index in wanted] for row, n in cells])
                 table[~np.isfinite(table)] = np.nan
                 yield table, np.array([float(n) for n, _ in chunk])
 

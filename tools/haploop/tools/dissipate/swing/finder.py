@@ -23,7 +23,7 @@ from haploop.tools.dissipate.swing.lasting import HOPS, NEEDED, lasting, make_bu
 from haploop.tools.dissipate.swing.lines import Slower, fast_rms_m, overtone_of, swing, within_counts
 from haploop.tools.dissipate.swing.several import SeveralFinder
 from haploop.tools.dissipate.swing.windows import End, Window, widest_m
-from haploop.view.look.spectrum import Line, main_line
+from haploop.view.look.spectrum import Line, amplitudes, main_line
 
 # It goes on to the end of a part whose last half second it swings through, this share of the window before as wide.
 _GOES_ON = 0.9
@@ -127,8 +127,10 @@ class BuzzFinder:
         else:
             self.hidden.end()
         if self._band is FAST:
-            self._fast_m.append(fast_rms_m(x_m, rate_Hz))
-            self._several.look(from_s if from_s == self._begins_s else from_s + inside_s, to_s - inside_s, x_m, rate_Hz)
+            spectrum = amplitudes(x_m, rate_Hz)
+            self._fast_m.append(fast_rms_m(spectrum))
+            since_s = from_s if from_s == self._begins_s else from_s + inside_s
+            self._several.look(since_s, to_s - inside_s, x_m, spectrum)
         if line and (slower := overtone_of(line, x_m, rate_Hz, self._band)):
             self._left_out.append(Overtone(line, slower.frequency_Hz))
             line = None

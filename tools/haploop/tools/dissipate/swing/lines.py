@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -9,12 +10,12 @@ import numpy as np
 from haploop.launch.stability.traces import is_felt
 from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.dissipate.swing.buzz import FAST, Band
-from haploop.view.look.spectrum import Line, amplitudes, line_at, lobe, main_line
+from haploop.view.look.spectrum import Line, line_at, lobe, main_line
 
 # Of several swings, of which these are the most, each has so much of the variance, and peaks are so many lines apart.
 _MOST, _OF_EACH, _APART = 3, 0.1, 2
 # The staircase of an encoder swings by less than a count, here the step that nine of ten exceed.
-COUNTS, _SMALLEST = 2, 10.0
+COUNTS, _SMALLEST = 2, 0.1
 # Of a swing within the counts their rounding leaves so much of the variance; the staircase of a steady motion has 0.61
 # of its own in its first line.
 _ROUNDED = 0.68
@@ -29,15 +30,16 @@ _FEWEST_PERIODS = 2.5
 _STILL, _STEPS = 1e-3, 12
 # In a window in which the frequency changes, or that lines share, they meet it to so many.
 BLURRED_HZ = 0.3 * FAST.resolved_Hz
+# Frequencies of a window, Hz, and amplitudes, m, 0 to peak.
+Spectrum = tuple[Floats, Floats]
 
 
 def swing(x_m: Floats, rate_Hz: float, band: Band = FAST) -> Line | None:
     """Returns the swing of a window that has a frequency of the band and is felt."""
     if len(x_m) <= 3 * band.drift:
         return None
-    t = np.linspace(-1.0, 1.0, len(x_m))
-    flat = x_m - np.polyval(np.polyfit(t, x_m, band.drift), t)
-    line = main_line(flat, rate_Hz, band.above_Hz)
+    drift = _drift(len(x_m), band.drift)
+    line = main_line(x_m - drift @ (drift.T @ x_m), rate_Hz, band.above_Hz)
     if line is None or line.share < (min(band.share, _ROUNDED) if within_counts(line, x_m) else band.share):
         return None
     line = _beside_drift(line, x_m, rate_Hz, band) if band.drift > 1 else line
@@ -59,43 +61,70 @@ def _beside_drift(line: Line, x_m: Floats, rate_Hz: float, band: Band) -> Line |
     four parameters), under a window of Hann.
     """
     count = len(x_m)
-    t, weight = np.linspace(-1.0, 1.0, count), np.sin(np.pi * (np.arange(count) + 0.5) / count)
-    drift, periods = np.vander(t, band.drift + 1) * weight[:, None], line.frequency_Hz * count / rate_Hz
+    t, weight = np.linspace(-1.0, 1.0, count), _hann(count)
+    drift, periods = _drift(count, band.drift, under_hann=True), line.frequency_Hz * count / rate_Hz
+
+    def rest(column: Floats) -> Floats:
+        """Returns what a drift leaves of a column under the window."""
+        weighted = weight * column
+        return weighted - drift @ (drift.T @ weighted)
+
+    rest_m, fit = rest(x_m), np.zeros(0)
     for _ in range(_STEPS):
         turn = np.pi * periods * t
         cosine, sine = np.cos(turn), np.sin(turn)
-        columns = np.column_stack([drift, weight * cosine, weight * sine])
-        a, b = np.linalg.lstsq(columns, weight * x_m, rcond=None)[0][-2:]
-        slope = np.pi * t * (b * cosine - a * sine)
-        step = float(np.linalg.lstsq(np.column_stack([columns, weight * slope]), weight * x_m, rcond=None)[0][-1])
+        columns = [rest(cosine), rest(sine)]
+        if not len(fit):
+            fit = _least_squares(columns, rest_m)
+        slope = rest(np.pi * t * (fit[1] * cosine - fit[0] * sine))
+        fit = _least_squares([*columns, slope], rest_m)
+        step = float(fit[2])
         if abs(step) < _STILL:
-            return Line(periods * rate_Hz / count, 2.0 * float(np.hypot(a, b)), line.share)
+            return Line(periods * rate_Hz / count, 2.0 * float(np.hypot(fit[0], fit[1])), line.share)
         periods += min(max(step, -0.5), 0.5)
         if periods < _FEWEST_PERIODS:
             return None
     return None
 
 
+@lru_cache(maxsize=8)
+def _drift(count: int, degree: int, under_hann: bool = False) -> Floats:
+    """Returns orthonormal columns, shape (count, degree + 1), that span the polynomials of a degree."""
+    columns = np.vander(np.linspace(-1.0, 1.0, count), degree + 1)
+    return np.linalg.qr(columns * _hann(count)[:, None] if under_hann else columns)[0]
+
+
+def _hann(count: int) -> Floats:
+    """Returns weights whose squares are a window of Hann."""
+    return np.sin(np.pi * (np.arange(count) + 0.5) / count)
+
+
+def _least_squares(columns: list[Floats], x_m: Floats) -> Floats:
+    rows = np.array(columns)
+    return np.linalg.lstsq(rows @ rows.T, rows @ x_m, rcond=None)[0]
+
+
 def _counts_m(x_m: Floats) -> float:
     """Returns how wide the staircase of an encoder may swing."""
     steps = np.abs(np.diff(x_m))
-    return COUNTS * float(np.percentile(steps[steps > 0.0], _SMALLEST)) if steps.any() else 0.0
+    steps = np.sort(steps[steps > 0.0])
+    return COUNTS * float(np.interp(_SMALLEST * (len(steps) - 1), np.arange(len(steps)), steps)) if len(steps) else 0.0
 
 
-def fast_rms_m(x_m: Floats, rate_Hz: float) -> float:
+def fast_rms_m(spectrum: Spectrum) -> float:
     """Returns the root mean square of what is faster than a hand's motion, under the window of Hann of the spectrum."""
-    at, height = amplitudes(x_m, rate_Hz)
+    at, height = spectrum
     # A line of the height h has a variance of h^2 / 2, and that window spreads it over lines with 1.5 times as much; a
     # slower motion reaches two lines further.
     return float(np.sqrt((height[at > FAST.above_Hz + 2.0 * FAST.resolved_Hz] ** 2).sum() / 3.0))
 
 
-def swings(x_m: Floats, rate_Hz: float) -> tuple[Line, ...]:
+def swings(x_m: Floats, spectrum: Spectrum) -> tuple[Line, ...]:
     """Returns the swings of a window at several frequencies at once, from slow to fast; empty where there are none.
 
     All are faster than a hand's, wider than the counts are, and felt.
     """
-    at, height = amplitudes(x_m, rate_Hz)
+    at, height = spectrum
     power = np.where(at > FAST.above_Hz, height**2, 0.0)
     if not (whole := float(power.sum())):
         return ()

@@ -9,7 +9,7 @@ import numpy as np
 
 from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.dissipate.swing.buzz import FAST, Overtone, Several
-from haploop.tools.dissipate.swing.lines import Slower, is_overtone, swings
+from haploop.tools.dissipate.swing.lines import Slower, Spectrum, is_overtone, swings
 from haploop.view.look.spectrum import Line
 
 # So many windows in a row, a quarter of one apart, swing for a second.
@@ -34,9 +34,9 @@ class SeveralFinder:
         """Begins anew after a gap."""
         self._stretches.append([])
 
-    def look(self, from_s: float, to_s: float, x_m: Floats, rate_Hz: float) -> None:
+    def look(self, from_s: float, to_s: float, x_m: Floats, spectrum: Spectrum) -> None:
         """Takes a window, of which the times are those in which it may have swung."""
-        window = _Window(from_s, to_s, swings(x_m, rate_Hz))
+        window = _Window(from_s, to_s, swings(x_m, spectrum))
         last = self._stretches[-1]
         if last and not _is_alike(window.lines, last[-1].lines):
             last = []
