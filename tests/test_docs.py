@@ -13,7 +13,9 @@ from typing import Any
 import pytest
 import typer.main
 
+from haploop.controller.dissipation import registry
 from haploop.launch.scene.bundled import bundled
+from haploop.launch.scene.schema import whole_schema
 from haploop.tools.cli.app import app
 from helpers.documented import command_lines
 
@@ -143,6 +145,13 @@ def test_the_drawing_of_the_architecture_names_folders_that_exist() -> None:
     paths = [path for path in named(drawing) if "..." not in path]
     assert len(paths) >= 5
     assert [path for path in paths if not exists(path)] == []
+
+
+def test_the_drawing_of_the_loop_names_every_table_of_a_scene_and_no_other() -> None:
+    drawing = (HOUSE / "docs/pictures/loop.svg").read_text(encoding="utf-8")
+    drawn = {name.partition(".")[0] for name in re.findall(r"\[([a-z.]+)\]", drawing)}
+    plain = {"title", "extends", "duration", "seed", "diverged_beyond"}
+    assert drawn == whole_schema(registry())["properties"].keys() - plain
 
 
 def test_the_quick_tests_are_files_that_exist() -> None:
