@@ -22,8 +22,10 @@ from haploop.plant.where_it_pays import WhereItPays
 from helpers.live.launched import Launched, Run
 
 # The same examples every time: a test fails for what was changed, never by chance; the profile explore draws new ones.
-settings.register_profile("haploop", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
-settings.register_profile("explore", settings.get_profile("haploop"), derandomize=False)
+settings.register_profile(
+    "haploop", deadline=None, derandomize=True, max_examples=40, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.register_profile("explore", settings.get_profile("haploop"), derandomize=False, max_examples=400)
 settings.register_profile("quick", settings.get_profile("haploop"), max_examples=20)
 settings.load_profile("haploop")
 # Tests start hundreds of processes. Where the environment forbids bytecode, as container images do, each of them would

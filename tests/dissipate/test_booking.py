@@ -92,7 +92,7 @@ def test_between_whole_delays_straight_lines_weigh_them_by_their_shares(share: f
     delay=st.sampled_from([0.0, 1e-3, 2.3e-3]),
     bent=st.booleans(),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_how_the_recording_is_cut_changes_no_bit(cuts: list[int], delay: float, bent: bool) -> None:
     rng = np.random.default_rng(2)
     x = rng.normal(size=120) * 1e-4

@@ -34,7 +34,7 @@ def found(t: Floats, x: Floats, force: Floats, delay_s: float = 0.0) -> Buzz:
     return buzz
 
 
-@pytest.mark.parametrize("seed", [*range(0, 40, 4), *slowly(seed for seed in range(40) if seed % 4)])
+@pytest.mark.parametrize("seed", [*range(5), *slowly(range(5, 25))])
 def test_width_times_and_power_are_those_of_a_drawn_sine_on_a_drift_that_begins_at_once_or_late(seed: int) -> None:
     """A spring that is d + T/2 late gives K A^2 w sin(w (d + T/2)) / 2, less by sinc(w T/2) for its steps."""
     random = np.random.default_rng(seed)

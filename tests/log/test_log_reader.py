@@ -39,7 +39,7 @@ def write_blocks(path: Path, blocks: list[np.ndarray], compression: Compression 
             log.flush()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     sizes=st.lists(st.integers(1, 30), min_size=1, max_size=5),
     seed=st.integers(0, 2**32),
@@ -133,7 +133,7 @@ def test_a_flipped_bit_ends_the_reading_before_its_chunk(tmp_path: Path) -> None
     assert "damaged: crc validation failed" in recording.cut
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(share=st.floats(0, 1, exclude_max=True), byte=st.integers(1, 255), length=st.integers(1, 30))
 def test_damage_anywhere_gives_a_recording_or_a_log_error(
     tmp_path_factory: pytest.TempPathFactory, share: float, byte: int, length: int

@@ -64,7 +64,7 @@ def write_run(path: Path, *, blocks: int, flush_every: int, compression: Compres
 NAMES = st.lists(st.text(st.characters(exclude_categories=["Cs"]), max_size=40), min_size=1, max_size=20, unique=True)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     names=NAMES,
     samples=st.none() | st.integers(1, 20),

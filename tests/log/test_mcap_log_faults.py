@@ -70,7 +70,7 @@ def run_log(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     return path.read_bytes()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(share=st.floats(0, 1))
 def test_a_log_cut_anywhere_streams_a_prefix_of_its_messages(run_log: bytes, share: float) -> None:
     whole, cut = streamed(run_log), streamed(run_log[: int(share * len(run_log))])
@@ -85,7 +85,7 @@ def full_log(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return path.read_bytes()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(room=st.integers(0, 120_000))
 def test_a_full_disk_raises_one_sentence_and_leaves_whole_chunks(
     full_log: bytes, tmp_path_factory: pytest.TempPathFactory, room: int

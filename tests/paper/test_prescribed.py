@@ -21,6 +21,7 @@ from haploop.tools.studies.choi2022.sampled import (
     steps_J,
     taken_J,
 )
+from helpers.scenes.effect_tables import slowly
 
 FREQUENCIES = np.array([3.7, 21.3, 57.1, 143.9, 211.7, 333.1, 451.3])
 THETA = 2.0 * np.pi * FREQUENCIES * PERIOD_S
@@ -29,7 +30,7 @@ CHANGES = st.floats(0.01, 1.0)
 
 
 @pytest.mark.parametrize("kind", LINEAR)
-@pytest.mark.parametrize("late", [0, 1, 2, 5])
+@pytest.mark.parametrize("late", [0, 2, *slowly([1, 5])])
 def test_under_a_sine_the_programs_controller_takes_what_the_closed_form_says(kind: str, late: int) -> None:
     formula = closed_form(kind, THETA, late)
     assert mean_taken(kind, THETA, late) == pytest.approx(formula, abs=2e-3 * np.abs(formula).max())

@@ -41,7 +41,7 @@ def messages(draw: st.DrawFn) -> tuple[str, list[Any]]:
 
 
 @pytest.mark.parametrize("name", MESSAGES)
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(data=st.data())
 def test_every_message_comes_back_as_it_was(name: str, data: st.DataObject) -> None:
     fields = [data.draw(FIELD[kind]) for _, kind in MESSAGES[name].fields]

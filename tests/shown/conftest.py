@@ -1,4 +1,4 @@
-"""Runs that figures are drawn of, made once for all tests of a worker."""
+"""Runs that figures are drawn of, each made once for all tests of a worker that draw it."""
 
 from __future__ import annotations
 
@@ -8,17 +8,31 @@ import pytest
 
 from helpers.runs.drawn import BUSY, NO_WALL, made
 
+# Scene and settings of each.
+_RUNS = {
+    "swap": ("swap",),
+    "tap": ("tap",),
+    "busy": (BUSY,),
+    "no-wall": (NO_WALL,),
+    "diverged": ("fig6b", "wall.stiffness=50000"),
+    "no-hand": (NO_WALL, "wall.position=0.005", "wall.stiffness=500", "wall.occupies=above"),
+    "ticks": ("fig6c", 'run.log="ticks"', "duration=1.2"),
+    "never-there": ("fig6c", "duration=0.2"),
+}
+
+
+class Runs(dict[str, Path]):
+    """Directories of runs by name, each run when it is asked for first."""
+
+    def __init__(self, base: Path) -> None:
+        super().__init__()
+        self._base = base
+
+    def __missing__(self, name: str) -> Path:
+        self[name] = made(self._base / name, *_RUNS[name])
+        return self[name]
+
 
 @pytest.fixture(scope="session")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    base = tmp_path_factory.mktemp("runs")
-    return {
-        "swap": made(base / "swap", "swap"),
-        "tap": made(base / "tap", "tap"),
-        "busy": made(base / "busy", BUSY),
-        "no-wall": made(base / "no-wall", NO_WALL),
-        "diverged": made(base / "diverged", "fig6b", "wall.stiffness=50000"),
-        "no-hand": made(base / "no-hand", NO_WALL, "wall.position=0.005", "wall.stiffness=500", "wall.occupies=above"),
-        "ticks": made(base / "ticks", "fig6c", 'run.log="ticks"', "duration=1.2"),
-        "never-there": made(base / "never-there", "fig6c", "duration=0.2"),
-    }
+    return Runs(tmp_path_factory.mktemp("runs"))

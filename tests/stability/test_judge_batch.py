@@ -42,9 +42,9 @@ def rubbing() -> list[Scene]:
 
 def devices() -> list[Scene]:
     """Premium 1.5s of other masses, of which friction alone holds some."""
-    scenes = [replace(load("demo", ["event=[]"]), duration=1.0)] * 6
+    scenes = [replace(load("demo", ["event=[]"]), duration=1.0)] * 3
     return [
-        with_value(with_value(scene, "device.mass", 0.05 + 0.02 * (i % 3)), "wall.stiffness", 400.0 + 500.0 * i)
+        with_value(with_value(scene, "device.mass", 0.05 + 0.02 * i), "wall.stiffness", 400.0 + 1000.0 * i)
         for i, scene in enumerate(scenes)
     ]
 

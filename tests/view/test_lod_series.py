@@ -67,7 +67,7 @@ def fed(rows_per_tick, ticks, recent_ticks=512, seed=1, pieces=(37, 1, 400, 5)):
 
 @pytest.mark.parametrize("rows_per_tick", [1, 10])
 @pytest.mark.parametrize("bucket", [1, 2, 8, 64, 1024])
-@pytest.mark.parametrize("ticks", [300, 4000, 70_001])
+@pytest.mark.parametrize("ticks", [300, 4001])
 def test_an_envelope_keeps_every_least_and_every_greatest_value(rows_per_tick, bucket, ticks):
     """Level by level and in the unfinished last bucket too."""
     series, rows = fed(rows_per_tick, ticks)

@@ -16,6 +16,7 @@ from haploop.view.look.sight import see
 from haploop.view.look.spectrum import amplitudes, main_line
 from haploop.view.receive.ingest import Backfill
 from haploop.view.store.history import AtWork, History
+from helpers.scenes.effect_tables import slowly
 
 TIME = Timebase(10_000, 1_000, 0, 100_000)
 COUNT_M = 1e-5
@@ -162,7 +163,7 @@ def test_a_swing_of_the_force_that_is_over_is_told_too_until_two_seconds_show_no
     assert (stops(2.7).word, gone.word) == ("force ripples", "no swing seen")
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", [*range(10), *slowly(range(10, 30))])
 def test_whatever_moved_or_rippled_in_the_last_two_seconds_is_never_unseen(seed):
     """Pushes, bursts of a buzz, also between ticks, slow swings and ripples of the force, drawn."""
     draw = np.random.default_rng(seed)
@@ -186,7 +187,7 @@ def test_whatever_moved_or_rippled_in_the_last_two_seconds_is_never_unseen(seed)
     assert ripple.word in ("dying away", "force ripples")
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", [*range(10), *slowly(range(10, 30))])
 def test_what_is_said_to_rest_moved_no_further_than_told_in_the_time_told(seed):
     """Some motions are a little wider than what counts, others a little narrower; a flicker by one count is rest."""
     draw = np.random.default_rng(seed)

@@ -60,7 +60,7 @@ def extreme(seed: int) -> Scene:
     return scene(**tables)
 
 
-@pytest.mark.parametrize("seed", [*range(12), *slowly(range(12, 120))])
+@pytest.mark.parametrize("seed", [*range(4), *slowly(range(4, 60))])
 def test_the_books_close_to_1e_12_in_scenes_with_effects_drawn_from_far_too_wide_a_range(seed):
     ran = run(extreme(seed))
     assert ran.relative_residual < 1e-12

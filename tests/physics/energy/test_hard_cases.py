@@ -78,7 +78,7 @@ def extreme(seed: int) -> Scene:
     return scene(**tables)
 
 
-@pytest.mark.parametrize("seed", [*range(15), *(pytest.param(s, marks=pytest.mark.slow) for s in range(15, 600))])
+@pytest.mark.parametrize("seed", [*range(8), *(pytest.param(s, marks=pytest.mark.slow) for s in range(8, 250))])
 def test_the_books_close_to_1e_12_in_scenes_drawn_from_far_too_wide_a_range(seed):
     assert run(extreme(seed)).relative_residual < 1e-12
 
