@@ -200,6 +200,13 @@ def test_a_name_in_extends_that_is_no_file_is_told_with_its_line_and_the_one_tha
     assert (f"; did you mean {meant}?" in mistake) if meant else ("did you mean" not in mistake)
 
 
+def test_beside_a_file_that_is_absent_the_mistakes_of_the_others_are_told_and_no_key_that_it_may_hold(files):
+    wrong = 'extends = ["gone.toml", "below.toml"]\nduraton = 1.0\n[hand.force]\nvalue = 1.0\n'
+    found = file_mistakes(files(top=wrong, below='duration = "1 m"\n[wall]\nstiffnes = 3\n'))
+    assert sorted(line.split()[0] for line in found) == ["below.toml:1:", "below.toml:3:", "top.toml:1:", "top.toml:2:"]
+    assert [word for line in found if (word := "is missing") in line] == []
+
+
 @pytest.mark.parametrize("value", ['"3 N/mm', "'3 N/mm", '["a", "b]', '"""3'])
 def test_a_quotation_mark_that_is_not_closed_is_told_in_words(files, value):
     [mistake] = file_mistakes(files(top=f"title = {value}\nseed = 1\n"))

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 # Where the key ``kind`` says what else is in a table; a number stands for any.
 _TAGGED = {("hand", "force"), ("jitter",), ("dissipation", 0), ("event", 0, "swap")}
+# What may be no mistake once the file is there that lacks.
+_ELSEWHERE = ("missing", "union_tag_not_found")
 _SOME_S = 1.0
 _OWN_KIND = " {} of yours comes with --plugin FILE."
 # What a file of one's own may bring, by the last keys of where it is named.
@@ -71,6 +73,8 @@ def validated(layers: Layers, tables: Tables, kinds: Mapping[str, type[Element]]
         schema = whole_schema(kinds)
         tagged = _TAGGED if len(kinds) > 1 else _TAGGED - {("dissipation", 0)}  # one kind alone is no choice
         for detail in error.errors(include_url=False):
+            if layers.lacks_a_file and detail["type"] in _ELSEWHERE:
+                continue
             complain(layers, detail["type"], detail["msg"], _plain(detail["loc"], tagged), schema)
     return None
 
@@ -89,6 +93,8 @@ def with_rules(layers: Layers, scene: Scene | None, kinds: Mapping[str, type[Ele
     Raises:
         SceneError: all mistakes, those already known to ``layers`` included.
     """
+    if layers.lacks_a_file:
+        raise SceneError(layers.mistakes)
     draft = Draft(layers.data, scene, read_table, layers.complain)
     for effect in all_effects():
         effect.check(draft)

@@ -37,16 +37,18 @@ class Layers:
 
     Attributes:
         origins: the file, or ``"--set"``, that gave each value, and the last file that wrote into each table.
-        doubled: mistakes of keys that are given twice in one file, with which reading goes on.
+        gone_over: mistakes with which reading goes on: of keys that are given twice in one file, of absent files.
         files: how many have been read.
+        lacks_a_file: whether one that is extended is absent, which may hold any key that is missing.
     """
 
     path: Path
     data: Tables = field(default_factory=dict)
     origins: dict[KeyPath, str] = field(default_factory=dict)
     mistakes: list[Mistake] = field(default_factory=list)
-    doubled: list[Mistake] = field(default_factory=list)
+    gone_over: list[Mistake] = field(default_factory=list)
     files: int = 0
+    lacks_a_file: bool = False
 
     def origin(self, key: KeyPath) -> str:
         """Returns the file that gave the value at ``key``, or the table nearest to it."""
@@ -119,14 +121,15 @@ def read_layers(path: Path) -> Layers:
     Where there is no such file, a path is the name of one that comes with haploop: a scene, or for ``extends`` one
     with its folder, ``devices/premium15.toml``.
 
-    Raises SceneError for a file that cannot be read, or that extends itself.
+    Raises SceneError for a file that cannot be read, or that extends itself. One that is extended and absent is a
+    mistake of the layers.
     """
     path = found(path, "scenes")
     layers = Layers(path)
     _read(layers, path, ())
     if layers.mistakes:
-        raise SceneError([*layers.doubled, *layers.mistakes])
-    layers.mistakes += layers.doubled
+        raise SceneError([*layers.gone_over, *layers.mistakes])
+    layers.mistakes += layers.gone_over
     return layers
 
 
@@ -144,7 +147,7 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
         layers.mistakes.append(Mistake(shown(chain[-1]), "", "", f"A scene cannot extend itself: {circle}."))
         return
     try:
-        table = parse(path, doubled=layers.doubled)
+        table = parse(path, doubled=layers.gone_over)
     except SceneError as error:
         layers.mistakes += error.mistakes
         return
@@ -161,7 +164,8 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
             _read(layers, file, (*chain, here))
         else:
             line = line_in(str(path), ("extends",))
-            layers.mistakes.append(Mistake(shown(path), "extends", *_absent(name, path.parent), line=line))
+            layers.gone_over.append(Mistake(shown(path), "extends", *_absent(name, path.parent), line=line))
+            layers.lacks_a_file = True
     layers.lay(table, str(path))
 
 
