@@ -1,50 +1,13 @@
 """Words of the page about a loop as it goes: no word before it can be told, none that the picture contradicts."""
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 
-from haploop.launch import load, run
-from haploop.protocol.scene.scene import Wall
-from haploop.protocol.ticks import Timebase
-from haploop.view.look.book_names import book_names
-from haploop.view.look.budget import budget
-from haploop.view.look.compare import Changes
 from haploop.view.look.sight import see
 from haploop.view.look.spectrum import amplitudes, main_line
-from haploop.view.receive.ingest import Backfill
-from haploop.view.store.history import AtWork, History
+from haploop.view.store.history import History
+from helpers.runs.seen import COUNT_M, TIME, deep, history_of, seen, sine
 from helpers.scenes.effect_tables import slowly
-
-TIME = Timebase(10_000, 1_000, 0, 100_000)
-COUNT_M = 1e-5
-
-
-def history_of(x, force, wall_m: float | None = 0.0):
-    """A history of positions and forces over time, functions of s, sampled at plant steps, of 3 s."""
-    history, ticks = History(TIME, 0), 3000
-    t = np.arange(ticks * 10) / 1e4
-    history.append_steps(0, {"x": x(t) + 0.0 * t, "force": force(t) + 0.0 * t})
-    now = np.arange(ticks) / 1e3
-    columns = {"x": x(now) + 0.0 * now, "v": 0.0 * now, "wall": 0.0 * now, "total": force(now) + 0.0 * now}
-    history.append_ticks(0, columns, AtWork((), None if wall_m is None else Wall(position=wall_m, stiffness=100.0)))
-    return history
-
-
-def seen(x, force=lambda t: 0.1, since=0, end=3000, wall_m: float | None = 0.0):
-    found = see(history_of(x, force, wall_m), since, end, COUNT_M)
-    assert found
-    return found
-
-
-def deep(t):
-    return -1e-3 + 0.0 * t
-
-
-def sine(f, size):
-    return lambda t: -5e-3 + size * np.sin(2 * np.pi * f * t)
 
 
 @pytest.mark.parametrize("f", [3.3, 37.25, 200.1])
@@ -205,112 +168,6 @@ def test_what_is_said_to_rest_moved_no_further_than_told_in_the_time_told(seed):
         assert f"the position stayed within {width * 1e6:.3g} µm" in found.why
     rests = seen(lambda t: -5e-3 + flickers[np.rint(t * 1e4).astype(int)], since=since)
     assert (rests.word, rests.rests) == ("no swing seen", True)
-
-
-def recorded(tmp_path, **values):
-    """The history of a run of 3 s, and its summary."""
-    loaded = load("fig6c").set({"duration": 3.0, **values})
-    result = run(loaded, out=tmp_path / "run")
-    time = Timebase.from_scene(loaded.scene)
-    backfill = Backfill(tmp_path / "run", loaded.scene, time, [])
-    backfill.read()
-    return backfill.history, result.summary
-
-
-def test_the_budget_closes_and_its_causes_are_those_of_the_summary(tmp_path):
-    history, summary = recorded(tmp_path)
-    found = budget(history, 0, history.end_tick)
-    assert found
-    total = {row["name"]: row["total_J"] for row in found["rows"]}
-    energy = summary["energy"]
-    leak = energy["wall"]["leak"]
-    assert abs(sum(total.values())) < 1e-15 * energy["moved_J"] + 1e-17
-    for name, value in {
-        "hand": -energy["hand_work_J"], "sampling and hold": leak["sampling_and_hold_J"], "delay": leak["delay_J"],
-        "heat in device": energy["device_heat_J"], "unidirectional-inertia": energy["elements"][0]["true_J"],
-    }.items():  # fmt: skip
-        # The books on the page are those of the last tick, the summary's of the end: one tick apart.
-        assert total[name] == pytest.approx(value, rel=0.02), name
-    last = budget(history, 1500, history.end_tick)
-    early = budget(history, 0, 1501)
-    assert last
-    assert early
-    for late, soon, whole in zip(last["rows"], early["rows"], found["rows"], strict=True):
-        assert late["window_J"] + soon["total_J"] == pytest.approx(whole["total_J"], abs=1e-15)
-    assert abs(sum(row["window_J"] for row in last["rows"])) < 1e-17
-
-
-def test_an_element_that_was_changed_is_told_by_kind_and_by_when_each_of_its_numbers_came(tmp_path):
-    def names(name, events):
-        damped = {"duration": 0.5, "dissipation": [{"kind": "damping", "damping": 1.0}]}
-        history, _ = recorded(tmp_path / name, **damped, event=events)
-        found = budget(history, 0, history.end_tick)
-        assert found
-        return [row["name"] for row in found["rows"] if "damping" in row["name"]]
-
-    faster = [{"at": at, "set": {"dissipation.0.damping": size}} for at, size in ((0.12, 2.0), (0.2345, 3.0))]
-    assert names("as it was", []) == ["damping"]
-    assert names("changed", faster) == ["damping, from 0 s", "damping, from 0.12 s", "damping, from 0.235 s"]
-
-
-def test_of_a_run_joined_on_its_way_nobody_is_told_since_when_what_was_there_is_at_work():
-    history, row = History(TIME, 1000), np.arange(100.0)
-    history.append_energy(1000, {"wall.true": row, "damping-2.true": row, "damping-3.true": row})
-    history.append_energy(1100, {"wall.true": row, "damping-2.true": row, "damping-3.true": row, "damping-4.true": row})
-    told = {"damping-2": "damping, earlier", "damping-3": "damping, earlier (2)", "damping-4": "damping, from 1.1 s"}
-    assert book_names(history) == told
-
-
-def test_what_the_law_of_a_wall_takes_is_a_cause_of_its_own_and_no_leak(tmp_path):
-    damped = {"duration": 0.3, "wall.position": 0.001, "wall.kind": "kelvin-voigt", "wall.damping": 1.0}
-    history, summary = recorded(tmp_path, **damped)
-    found = budget(history, 0, history.end_tick)
-    assert found
-    total, of_wall = {row["name"]: row["total_J"] for row in found["rows"]}, summary["energy"]["wall"]
-    assert total["law of the wall"] == pytest.approx(of_wall["dissipated_J"], rel=0.02)
-    assert total["sampling and hold"] == pytest.approx(of_wall["leak"]["sampling_and_hold_J"], rel=0.02)
-    assert abs(sum(total.values())) < 1e-12 * summary["energy"]["moved_J"]
-
-
-def test_the_two_sides_of_a_change_are_kept_also_when_the_history_has_forgotten_the_first():
-    def calms(t):
-        return np.where(t < 2.0, sine(40.0, 1e-3)(t), -5e-3)
-
-    history, changes = history_of(calms, lambda t: 0.1), Changes(COUNT_M)
-    events: list[Any] = [(1, {"pause": True}), (2000, {"swap": {"kind": "damping"}})]
-    assert changes.pair(history) is None
-    changes.note(history, events)
-    pair = changes.pair(history)
-    assert pair
-    tick, before, after = pair
-    assert before
-    assert after
-    assert (tick, before.sight.word, after.sight.word) == (2000, "swinging", "no swing seen")
-    assert before.traces.shape == (2, 500)
-    assert np.array_equal(before.traces[0], calms(np.arange(1500, 2000) / 1e3))
-    forgot: Any = SimpleNamespace(**{name: getattr(history, name) for name in ("end_tick", "steps", "ticks", "time")})
-    changes.note(forgot, events)
-    pair = changes.pair(history)
-    assert pair
-    assert pair[1] is before
-
-
-@pytest.mark.parametrize(("first", "lacking"), [(0, (950, 1050)), (0, (999, 1050)), (1200, None)])
-def test_a_side_of_a_change_that_was_not_received_is_not_held_and_no_number_that_is_not_finite(first, lacking):
-    """A page that joins late, or skipped ticks of a fast run just before the change."""
-    full, held = history_of(sine(40.0, 1e-3), lambda t: 0.1), History(TIME, 0)
-    for begin, end in ((first, lacking[0]), (lacking[1], 3000)) if lacking else ((first, 3000),):
-        for own, its in zip(held.all_series[:2], full.all_series[:2], strict=True):
-            own.append(begin, dict(zip(its.names, its.rows(its.names, begin, end), strict=True)))
-    held.at_work = full.at_work
-    held.ticks.begin(0)
-    changes = Changes(COUNT_M)
-    changes.note(held, [(1000, {"swap": {"kind": "damping"}})])
-    pair = changes.pair(held)
-    assert pair
-    tick, before, after = pair
-    assert after
-    assert (tick, before, after.sight.word) == (1000, None, "swinging")
 
 
 def test_what_swings_without_a_line_has_a_frequency_by_its_crossings_and_what_is_not_seen_to_swing_has_none():
