@@ -4,6 +4,8 @@ UV ?= uv
 BIN := .venv/bin
 # One more than there are processors: some tests wait for processes of their own.
 WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
+# Of the slow ones more tests do.
+MORE_WORKERS ?= $(shell expr $(WORKERS) + 1)
 SEEDS ?= 2000
 N ?= 50
 FROM ?= 0
@@ -35,7 +37,7 @@ test: $(READY) ## run the tests
 	@$(BIN)/pytest -q -n $(WORKERS) --dist worksteal -m "not slow"
 
 slow: $(READY) ## run the slow tests (that there are none is no failure: pytest then exits with 5)
-	@$(BIN)/pytest -q -n $(WORKERS) --dist worksteal -m slow || [ $$? -eq 5 ]
+	@$(BIN)/pytest -q -n $(MORE_WORKERS) --dist worksteal -m slow || [ $$? -eq 5 ]
 
 everywhere: $(READY) ## bits of every scene and the tests, whatever processor, CPython and dependencies (an hour; ONLY=name)
 	@PYTHONPATH=tests $(BIN)/python -m everywhere.command --only "$(ONLY)"

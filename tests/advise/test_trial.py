@@ -62,6 +62,7 @@ def test_projected_friction_in_machine_code_has_the_bits_of_numpy_also_when_memb
         assert all(np.array_equal(*pair) for some in zip(*found, strict=True) for pair in zip(*some, strict=True))
 
 
+@pytest.mark.slow
 def test_projected_friction_follows_the_exact_one_and_ever_closer_with_shorter_steps():
     def apart(rate: int) -> float:
         loop = loop_of("premium15", f"clock.plant_rate={rate}", "encoder.resolution=1e-9")
@@ -75,6 +76,7 @@ def test_projected_friction_follows_the_exact_one_and_ever_closer_with_shorter_s
     assert fine < 0.3 * coarse
 
 
+@pytest.mark.slow
 def test_what_sticks_under_projected_friction_does_not_move_by_a_bit():
     loop = loop_of("touch")
     seen = Loops([placed(loop, Case(1.0, sway=0.0), 1000.0)], KINDS).go_on(2000)
@@ -103,6 +105,7 @@ def test_a_loop_with_jitter_runs_by_itself_and_is_judged_all_the_same():
     assert stiff
 
 
+@pytest.mark.slow
 def test_above_what_friction_bridges_a_wall_chatters_and_below_it_rests():
     loop = loop_of("premium15")  # 2 f_c / q = 3.34 N/mm
     with Trial(Store()) as trial:

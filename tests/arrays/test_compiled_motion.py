@@ -91,10 +91,8 @@ def test_drawn_loops_move_as_in_arrays(seed: int) -> None:
 
 @pytest.mark.parametrize(
     ("damping", "duration", "diverged_beyond"),
-    [
-        pytest.param((1.0, 12.0), 0.6, 0.05, marks=pytest.mark.slow, id="soon"),
-        pytest.param((6.3, 6.58), 2.0, 0.9, id="late"),
-    ],
+    [((1.0, 12.0), 0.6, 0.05), ((6.3, 6.58), 2.0, 0.9)],
+    ids=["soon", "late"],
 )
 @pytest.mark.slow
 def test_loops_that_diverge_stand_still_where_they_did(

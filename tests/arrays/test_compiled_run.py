@@ -84,6 +84,7 @@ def test_put_together_for_a_gpu_the_loops_are_the_same(monkeypatch: pytest.Monke
     assert compiling()[0] == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("of_the_user", [None, "true"])
 def test_workers_share_the_memory_of_a_gpu_unless_the_user_says_otherwise(
     monkeypatch: pytest.MonkeyPatch, of_the_user: str | None

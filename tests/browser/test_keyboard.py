@@ -49,6 +49,7 @@ def test_with_the_keyboard_alone_an_element_is_swapped(stand_in, page):
     )
 
 
+@pytest.mark.slow
 def test_every_control_can_be_reached_by_tab(stand_in, page):
     """From the top to the last button, none left out: a group of radio buttons counts as one."""
     reached = set()

@@ -13,6 +13,7 @@ NAN = math.nan
 ROWS = 400
 
 
+@pytest.mark.slow
 @IN_BOTH
 def test_every_part_has_its_line_its_name_and_its_number(stand_in, page):
     stand_in.show(contact())

@@ -173,7 +173,6 @@ def test_what_the_page_draws_are_the_numbers_of_the_log(running, viewing):
     assert np.array_equal(total[::rows], controller["total"][900:1000].astype(np.float32))
 
 
-@IN_BOTH
 @pytest.mark.slow
 def test_after_the_end_the_page_shows_what_came_of_the_run_and_then_the_next_run(running, viewing):
     first = running(sets=("duration=1", "event=[{at=0.5, pause=true}]"))
@@ -191,7 +190,6 @@ def test_after_the_end_the_page_shows_what_came_of_the_run_and_then_the_next_run
     expect(page.locator("#pause")).to_be_enabled()
 
 
-@IN_BOTH
 @pytest.mark.slow
 def test_a_viewer_started_anew_on_its_port_is_found_again_but_its_old_link_steers_no_more(running, viewing, launched):
     run, port = running(sets=STANDS_AT_1000), str(free_port())

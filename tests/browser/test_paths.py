@@ -37,6 +37,7 @@ def distance(point, bends):
     )
 
 
+@pytest.mark.slow
 def test_a_straight_line_is_one_stroke_and_is_broken_where_there_are_no_values(stand_in, page):
     ramp = [i / 10 for i in range(600)]
     assert [how for how, *_ in drawn(page, ramp)] == ["move", "line"]

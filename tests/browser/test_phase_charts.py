@@ -55,6 +55,7 @@ def test_pressing_and_releasing_are_told_apart_anew_in_every_snapshot(stand_in, 
         assert not any(seen(page, "loop", parts, other)), colour
 
 
+@pytest.mark.slow
 def test_where_nothing_touches_and_where_there_is_no_spectrum_no_axes_stand_without_a_line(stand_in, page):
     free = [-1e-3] * 20
     for depth, force, told in ((free, [0.0] * 20, "Not in contact in this time."), (free, [0.1] * 20, "")):

@@ -36,6 +36,7 @@ TABLES = """<!doctype html><html style="font-size: 20px"><meta name="viewport" c
 <td>as <code class="whole">haploop run --plugin x.py</code> or any other says</td></tr></table>"""
 
 
+@pytest.mark.slow
 def test_a_table_with_a_long_name_at_the_head_of_a_row_fits_a_phone_and_a_short_name_stays_whole(
     browser: Browser, tmp_path: Path
 ):

@@ -169,6 +169,7 @@ def test_on_a_phone_one_row_of_controls_floats_runs_have_the_whole_width_and_eve
     expect(page.locator("#to-forms")).to_be_hidden()
 
 
+@pytest.mark.slow
 def test_on_a_phone_a_title_is_read_whole_and_a_verdict_with_a_proviso_keeps_its_sign_beside_its_word(
     stand_in, open_page
 ):

@@ -65,6 +65,7 @@ def test_to_stop_is_asked_first_and_may_be_taken_back(stand_in, page):
     assert order(stand_in, page, lambda: page.get_by_role("button", name="End the run").click()) == ("stop", {})
 
 
+@pytest.mark.slow
 def test_a_swap_sends_kind_where_it_acts_and_its_parameters_and_the_answer_is_told(stand_in, page):
     stand_in.answer = lambda command: (True, "element 1 becomes damping at tick 1500 (1.5 s)")
     page.select_option("#swap-element", "1")
@@ -175,6 +176,7 @@ def test_what_the_run_refuses_is_told_beside_the_field_that_it_names(stand_in, p
     assert page.input_value("#swap-kind") == "damping"
 
 
+@pytest.mark.slow
 def test_a_fault_that_names_no_field_is_pinned_to_none_and_an_element_taken_back_is_told_as_a_failure(stand_in, page):
     options = {
         **OPTIONS,
@@ -255,6 +257,7 @@ def test_a_link_of_an_earlier_server_is_told_apart(stand_in, page):
     expect(page.locator("#said")).to_contain_text("open the one it printed last")
 
 
+@pytest.mark.slow
 def test_three_clicks_are_one_swap(stand_in, page):
     stand_in.answer = lambda command: None
     page.locator("#swap-do").evaluate("button => { for (let i = 0; i < 3; i++) button.click(); }")

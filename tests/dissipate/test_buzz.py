@@ -243,6 +243,7 @@ def test_of_a_short_slow_or_broken_recording_it_cannot_be_said() -> None:
     assert found.word() == "cannot say"
 
 
+@pytest.mark.slow
 def test_of_a_swing_within_the_counts_it_is_said_that_they_decide_and_not_that_it_is_not_felt(tmp_path: Path) -> None:
     x = swing(200.0, 8e-6) + 1e-3 * S
     coarse = outcome(write(tmp_path / "coarse.csv", {"t": S, "x": np.round(x / 1e-5) * 1e-5}))

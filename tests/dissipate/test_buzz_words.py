@@ -60,6 +60,7 @@ def test_where_gaps_leave_only_short_parts_that_swing_that_no_buzz_was_seen_is_n
     assert "too short to tell" not in whole
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dampings", [[], ["2"]])
 def test_the_figure_marks_when_and_at_how_many_hertz_it_buzzes(tmp_path: Path, dampings: list[str]) -> None:
     x = swing(45.0, 3e-4) * (S < 1.5) + swing(110.0, 2e-4) * (S > 2.5)

@@ -69,6 +69,7 @@ def test_the_last_line_of_the_table_names_the_figure(recording: Path) -> None:
         assert words in result.stdout
 
 
+@pytest.mark.slow
 def test_json_holds_what_the_table_does_and_the_figure_is_where_it_is_asked_for(
     recording: Path, tmp_path: Path
 ) -> None:

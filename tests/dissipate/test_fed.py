@@ -58,6 +58,7 @@ def test_the_power_given_to_a_swing_is_that_of_a_late_spring_in_closed_form(
     assert FEEDS in shown(make_report(found), 400)
 
 
+@pytest.mark.slow
 def test_a_force_that_fed_the_buzz_is_not_called_passive_though_the_press_had_stored_more(tmp_path: Path) -> None:
     found = booked(
         tmp_path, -K * np.minimum(pressed(S), 0.0) - 10.0 * np.gradient(pressed(S), S) * ((S > 0.01) & (S < 1.0))

@@ -227,6 +227,7 @@ def test_memory_does_not_grow_with_the_recording(tmp_path: Path) -> None:
     assert peaks[1] < 1.1 * peaks[0]
 
 
+@pytest.mark.slow
 def test_the_whole_of_a_long_recording_is_in_the_line_that_is_drawn(tmp_path: Path) -> None:
     t = np.arange(60_000) * 1e-3
     x = np.sin(t * 3.0) * 1e-3

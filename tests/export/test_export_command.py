@@ -68,6 +68,7 @@ def test_a_place_that_cannot_be_written_to_is_refused(run: Path, tmp_path: Path)
     refused(export(run, "--to", "npz", "--force"), 2, f"{run / 'log.npz'} exists already")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", first_and_slowly(*FORMATS))
 def test_a_disk_that_fills_leaves_nothing_behind(to: str, tmp_path: Path) -> None:
     needs(to)

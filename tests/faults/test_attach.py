@@ -60,6 +60,7 @@ def assert_same_from_its_first_tick_on(own, second):
     return first
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", first_and_slowly("2 ms", "0.3 ms", "0 ms"))
 def test_a_logger_that_joins_in_mid_run_logs_the_same_numbers_from_its_first_tick_on(delay, running, attached):
     """The swap after it has joined stands in its log too, the books it opens as well."""

@@ -104,6 +104,7 @@ REFUSED = [
 ]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_done_is_refused_with_the_reason_and_leaves_the_run_as_it_was(running, undisturbed):
     run = running()
     run.reaches(200)

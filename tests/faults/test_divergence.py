@@ -13,6 +13,7 @@ from helpers.live.launched import first_and_slowly
 UNSTABLE = ('dissipation=[{kind="damping", damping=60.0, acts="always"}]',)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [(), pytest.param(("--in-process",), marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("sets", "limit_m"), first_and_slowly(((), 1.0), (("diverged_beyond=0.03",), 0.03)))
 def test_a_device_beyond_the_limit_ends_the_run_with_verdict_tick_and_a_whole_log(options, sets, limit_m, running):

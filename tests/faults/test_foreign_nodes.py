@@ -192,6 +192,7 @@ seat.take_seat("odd plant", "1").run(lambda force: (0.0, 0.0), 0.0, 0.0)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", first_and_slowly("math.nan", "'x'", "[0.0]", "None", "-math.inf"))
 def test_a_foreign_plant_whose_sample_is_no_number_ends_the_run_by_name(
     value: str, started: Started, tmp_path: Path

@@ -83,6 +83,7 @@ def test_a_force_that_is_no_finite_number_fails_a_run_in_one_process_too(launche
     assert "Traceback" not in run.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("statement", "reason"),
     first_and_slowly(

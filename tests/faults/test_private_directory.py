@@ -191,6 +191,7 @@ def test_an_entry_that_is_none_is_passed_over(text):
         assert path.exists()
 
 
+@pytest.mark.slow
 def test_a_run_in_the_midst_of_starting_is_no_dead_one(running):
     """Another run that starts at that moment must not clear its directory away, however old it seems."""
     with private_directory.made() as early:

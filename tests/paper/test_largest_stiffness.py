@@ -86,6 +86,7 @@ def test_the_leak_of_a_sampled_contact_does_not_hang_on_where_the_tick_falls() -
     assert leaks.mean() == pytest.approx(14.6e-6, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_low_pass_with_the_least_lag_is_best_without_delay_from_small_inertias_on() -> None:
     """The paper's 10 g among them; late loops want more lag of small inertias."""
     first, last = least_lag_best_g(0.0).removesuffix(" g").split(" to ")

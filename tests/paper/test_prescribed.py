@@ -50,6 +50,7 @@ def test_bidirectional_inertia_takes_below_the_sample_rate_over_2d_plus_3_and_gi
     assert below > 0.0 > above
 
 
+@pytest.mark.slow
 def test_a_slow_sine_loses_the_whole_damping_and_its_kinetic_energy_twice_a_period_to_unidirectional_inertia() -> None:
     """A unidirectional mass takes m V^2 / 2 in each half period and gives nothing back."""
     hertz = 1.013

@@ -152,6 +152,7 @@ def gone(tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
+@pytest.mark.slow
 def test_a_run_is_drawn_without_its_kinds_and_no_later_scene_may_name_them(tmp_path: Path) -> None:
     out = gone(tmp_path)
     assert draw(out, tmp_path / "figure.png").stat().st_size > 10_000
@@ -164,6 +165,7 @@ def test_a_run_is_drawn_without_its_kinds_and_no_later_scene_may_name_them(tmp_p
         load(tmp_path / "scene.toml")
 
 
+@pytest.mark.slow
 def test_the_ideal_wall_of_a_run_is_drawn_where_its_file_is_given_again(tmp_path: Path) -> None:
     out = gone(tmp_path)
 

@@ -189,6 +189,7 @@ def test_an_element_has_one_name_and_one_colour_in_all_panels_also_where_another
     assert {"damping", "unidirectional-inertia", "brake", "brake-2"} <= {text.get_text() for text in legend.get_texts()}
 
 
+@pytest.mark.slow
 def test_no_legend_of_own_columns_reaches_over_its_title_however_many_elements_show_them(tmp_path):
     swaps = [{"at": 0.05 * n, "swap": {"kind": "brake", "damping": 0.1 * n}, "element": 0} for n in range(1, 7)]
     of = own([{"kind": "brake", "damping": 0.05}], event=swaps)

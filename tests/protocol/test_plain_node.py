@@ -128,14 +128,14 @@ def test_observers_may_join_a_paused_run_leave_it_hold_it_up_and_be_killed_while
 
 @pytest.mark.slow
 def test_a_viewer_that_stands_still_costs_nothing_and_afterwards_counts_what_it_missed(tmp_path: Path) -> None:
-    short_blocks = ("duration=3.0", "run.block_ticks=1", "run.window_blocks=100")
-    with going(tmp_path, *short_blocks, pauses=(100, 2900)) as run:
+    short_blocks = ("duration=2.3", "run.block_ticks=1", "run.window_blocks=100")
+    with going(tmp_path, *short_blocks, pauses=(100, 2200)) as run:
         run.stands_at(100)
         viewer = Observer(run, "--viewer")
         assert viewer.line()["first"] == {"plant": 100, "controller": 100}
         os.kill(viewer.process.pid, signal.SIGSTOP)
         run.ask("resume")
-        run.stands_at(2900)
+        run.stands_at(2200)
         os.kill(viewer.process.pid, signal.SIGCONT)
         while viewer.line()["quiet"] <= 100:
             pass
@@ -149,4 +149,4 @@ def test_a_viewer_that_stands_still_costs_nothing_and_afterwards_counts_what_it_
         rows = len(column(seen, role, "x"))
         assert seen[role]["gap_ticks"] > 0
     # Each tick of the controller is one row: those seen and those missed make up the whole.
-    assert rows + seen["controller"]["gap_ticks"] == 2900
+    assert rows + seen["controller"]["gap_ticks"] == 2200

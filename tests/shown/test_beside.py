@@ -192,6 +192,7 @@ def test_the_close_view_of_runs_of_unlike_length_is_where_all_of_them_are(runs, 
     assert len(artists(closer, "position")) == 2
 
 
+@pytest.mark.slow
 def test_below_an_overlay_the_notes_of_each_run_stand_with_its_name_and_shared_ones_once(runs):
     plain, odd = data(runs, "a", "bare")
     soft = replace(odd, scene=with_value(odd.scene, "wall.stiffness", 15.0))
@@ -236,6 +237,7 @@ def test_of_a_run_that_was_not_pushed_no_swing_after_a_push_is_told(runs):
     assert row(table, "pushed, it swings by") == ["2.00 mm", "–"]
 
 
+@pytest.mark.slow
 def test_plot_of_several_runs_writes_one_figure_and_refuses_what_it_cannot_draw(runs, tmp_path):
     done = haploop("plot", runs["a"], runs["again"], "--out", tmp_path / "both.png")
     assert done.exit_code == 0

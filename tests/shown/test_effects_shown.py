@@ -122,6 +122,7 @@ def test_the_terminal_shows_heats_what_the_actuator_kept_back_and_what_was_lost(
     assert not any(word in shown(summary_table(plain[1])) for word in ("friction", "actuator", "lost", "saturated"))
 
 
+@pytest.mark.slow
 def test_the_figure_draws_all_bodies_and_forces_of_the_plant_and_counts_what_was_lost(poor, plain):
     data = RunData.from_directory(poor[0])
     figure = make_figure(data)

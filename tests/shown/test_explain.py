@@ -90,6 +90,7 @@ def test_every_effect_of_a_tick_costs_instructions_and_is_billed():
     assert len(billed.elements) == 2
 
 
+@pytest.mark.slow
 def test_explain_shows_bodies_states_order_and_costs():
     result = CliRunner().invoke(app, ["explain", "premium_tap", "--cost", "--set", "accelerometer.bias=1"])
     assert result.exit_code == 0

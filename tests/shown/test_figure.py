@@ -145,6 +145,7 @@ def test_the_wall_is_drawn_where_it_stood(runs: dict[str, Path]) -> None:
     assert stiffness.tolist() == [150.0, 150.0, 120.0, 120.0]
 
 
+@pytest.mark.slow
 def test_the_approach_is_left_out_and_said_so_where_it_dwarfs_the_contact(runs: dict[str, Path]) -> None:
     swap, tap = (axes(make_figure(RunData.from_directory(runs[name])))[0] for name in ("swap", "tap"))
     assert "(approach not shown)" in swap.get_title(loc="left")

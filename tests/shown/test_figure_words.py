@@ -40,6 +40,7 @@ def test_events_are_marked_at_their_times_and_named(runs: dict[str, Path]) -> No
     assert "3 at 1.1 s: element 0 is removed" in " ".join(event_lines(data))
 
 
+@pytest.mark.slow
 def test_the_first_note_on_a_scene_stands_below_its_figure_with_how_many_there_are(runs: dict[str, Path]) -> None:
     data = RunData.from_directory(runs["swap"])
     [below] = artists(make_figure(data), "events")
@@ -68,6 +69,7 @@ def test_what_events_set_is_told_with_the_unit_that_it_has_at_that_time() -> Non
     assert "set dissipation.0.mass = 0.001 kg, clock.round_trip_delay = 0.002 s" in told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, 12])
 def test_key_numbers_that_are_too_long_for_a_line_take_two_and_none_is_cut(
     runs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, count: int

@@ -102,6 +102,7 @@ def test_a_device_that_nobody_holds_at_the_wall_is_undecided():
     assert (finding.word, finding.why) == ("undecided", "leaves the wall")
 
 
+@pytest.mark.slow
 def test_the_limit_cycles_of_the_paper_are_found_and_the_chaotic_one_is_told():
     regular, chaotic = (found(load(f"launch/scenes/fig6{letter}.toml")) for letter in "ac")
     assert (regular.word, regular.chaotic, chaotic.word, chaotic.chaotic) == ("limit-cycle", False, "limit-cycle", True)

@@ -17,6 +17,7 @@ from helpers.scenes.effect_tables import slowly
 from helpers.scenes.unseen_loops import KINDS, drawn
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [5, *slowly(range(5))], ids=KINDS.__getitem__)
 def test_a_loop_that_grows_is_never_called_steady(kind):
     """Two loops of each kind; hundreds are slow."""
@@ -26,10 +27,10 @@ def test_a_loop_that_grows_is_never_called_steady(kind):
 
 
 @pytest.mark.slow
-def test_of_forty_loops_none_is_called_steady_that_grows_and_few_stay_undecided():
+def test_of_two_dozen_loops_none_is_called_steady_that_grows_and_few_stay_undecided():
     words: Counter[tuple[bool, str]] = Counter()
     gone = 0
-    for seed in range(1000, 1040):
+    for seed in range(1000, 1024):
         loop = drawn(seed)
         finding = found(loop.scene) if loop else None
         if loop and finding and finding.word not in ("diverged", "no-contact"):
@@ -46,10 +47,10 @@ def test_of_forty_loops_none_is_called_steady_that_grows_and_few_stay_undecided(
 def test_none_is_called_steady_that_an_independent_program_sees_swing_and_few_stay_undecided():
     """Loops of every kind but with dry friction, which takes that program long: 600 and these by its own command."""
     scenes = ((seed, wild_loops.drawn(seed)) for seed in itertools.count(9000))
-    loops = judged((seed for seed, scene in scenes if scene and not scene.friction), 20)
+    loops = judged((seed for seed, scene in scenes if scene and not scene.friction), 12)
     assert not [one for one in loops if one.is_unsafe or one.is_false_alarm]
-    assert sum(one.finding.word == "undecided" for one in loops) <= 3
-    assert sum(one.swings > 1.0 for one in loops) >= 5
+    assert sum(one.finding.word == "undecided" for one in loops) <= 2
+    assert sum(one.swings > 1.0 for one in loops) >= 3
 
 
 def still_swings(scene, width_m: float) -> bool:

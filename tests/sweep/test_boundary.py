@@ -139,7 +139,7 @@ LOOPS = [(0.2, 0.0), (1.0, 0.002), (2.0, 0.0005)]
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("duration", "loops"),
-    [(0.5, LOOPS[1:2]), (4.0, LOOPS)],
+    [(0.5, LOOPS[1:2]), (2.0, LOOPS)],
 )
 def test_bisected_from_plain_runs_the_boundary_of_a_linear_loop_is_where_the_spectral_radius_is_one(
     duration: float, loops: list[tuple[float, float]]

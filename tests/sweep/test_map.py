@@ -132,6 +132,7 @@ def test_rows_in_any_order_and_a_sweep_that_still_runs_give_the_cells_that_are_t
     assert "7 not run yet" in words(drawn, "description")[0]
 
 
+@pytest.mark.slow
 def test_forty_thousand_cells_are_one_mesh() -> None:
     axes = {K: np.linspace(1.0, 200.0, 200).tolist(), B: np.geomspace(0.01, 10.0, 200).tolist()}
     cells = cells_of(axes)

@@ -124,6 +124,7 @@ def test_no_digit_of_what_is_told_lies_beyond_the_last_value_that_was_steady(poi
     assert words(bisect_figure(data), "star words") == told
 
 
+@pytest.mark.slow
 def test_more_lines_than_can_be_told_apart_are_left_out_and_counted() -> None:
     masses = [0.01 * number for number in range(1, 11)]
     given: Ends = {(b, m): 300.0 for b in range(1, 12) for m in masses}
@@ -168,6 +169,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return made
 
 
+@pytest.mark.slow
 def test_a_sweep_of_runs_that_are_not_pushed_calls_none_steady(swept: dict[str, Path]) -> None:
     """In its table, its boundaries, its map and its own file; ``holds`` is steady unless it says otherwise."""
     found = read(swept["search"])
@@ -190,6 +192,7 @@ def test_haploop_plot_draws_a_sweep_of_haploop_sweep(swept: dict[str, Path], nam
     assert (swept[name] / "figure.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_the_boundaries_drawn_are_those_of_the_program_s_table(swept: dict[str, Path]) -> None:
     found = read(swept["search"])
     data = make_map_data(found.columns, found.units, found.sweep, found.boundary)

@@ -82,6 +82,7 @@ def test_the_limit_over_delay_is_exact_at_whole_steps_and_only_there_asked_for()
     assert (np.diff(found[np.argsort(found[:, 0]), 1]) < 0).all()
 
 
+@pytest.mark.slow
 def test_without_a_stiffness_axis_the_line_is_where_the_scene_s_own_wall_is_at_its_limit() -> None:
     made = loop(clock={"round_trip_delay": 0.001})
     found = points(exact_limit(plane(made, b=[0.01, 0.1, 1.0], delay=[0.0, 0.002, 0.004, 0.006])).pieces)

@@ -27,6 +27,7 @@ def legend(figure: Any) -> str:
     return " ".join(words(figure, "legend"))
 
 
+@pytest.mark.slow
 def test_names_and_third_axes_make_panels_with_one_scale() -> None:
     kinds = ["damping", "bidirectional-inertia", "unidirectional-inertia"]
     axes = {"dissipation.0.kind": kinds, K: STIFFNESSES, B: DAMPINGS}

@@ -17,7 +17,7 @@ from helpers.live.launched import Launched, alive, processes, wait_for
 from helpers.scenes.sweep_files import PRESS, sweep_file, swept
 
 # Such scenes go into no array: so many take so long that something can be done to the sweep meanwhile.
-SLOW_PRESS = PRESS.replace("duration = 0.05", "duration = 0.5") + '[clock]\nintegrator = "rk4"\n'
+SLOW_PRESS = PRESS.replace("duration = 0.05", "duration = 0.3") + '[clock]\nintegrator = "rk4"\n'
 SLOW = '[axes]\n"wall.stiffness" = { from = 10, to = 480, step = 10 }\n'
 CELLS = 48
 LIMIT_BYTES = 30_000
@@ -87,7 +87,7 @@ def test_interrupted_twice_it_ends_at_once_and_keeps_what_was_stored(
     launched: Callable[..., Launched], tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    path = sweep_file(tmp_path, SLOW, SLOW_PRESS.replace("duration = 0.5", "duration = 2000.0"))
+    path = sweep_file(tmp_path, SLOW, SLOW_PRESS.replace("duration = 0.3", "duration = 2000.0"))
     run = launched("sweep", str(path), "--workers", "2", out=out)
     # The first cells take minutes: when the workers are busy, nothing is done yet.
     wait_for("busy workers", lambda: (out / "parts").exists() and len(workers_of(run.pid)) == 2)

@@ -174,6 +174,7 @@ def test_a_paused_run_sends_its_snapshot_once(tmp_path):
     follow(play, tmp_path, pauses=(300,))
 
 
+@pytest.mark.slow
 def test_what_stands_beside_the_charts_comes_with_every_third_picture_at_least_and_the_last(tmp_path):
     async def play(run, tab, here):
         came = []

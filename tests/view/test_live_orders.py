@@ -125,6 +125,7 @@ class Vanishing(LiveRuns):
         return [*super().live(), *self.other]
 
 
+@pytest.mark.slow
 def test_where_an_opened_run_has_gone_that_is_said_and_the_one_before_is_followed_on(tmp_path):
     runs = Vanishing()
 

@@ -51,6 +51,7 @@ def test_a_recorded_run_is_opened_with_its_numbers_events_and_verdict(recorded):
     assert (longer["from_s"], longer["to_s"]) == (0.0, 1.501)  # the end of the last tick is drawn, too
 
 
+@pytest.mark.slow
 def test_the_loop_of_a_run_that_has_ended_goes_to_its_end_and_no_further(tmp_path, monkeypatch):
     """The row of its end state is filled with numbers that are none, of which a wall's curve would be, too."""
     monkeypatch.chdir(tmp_path)

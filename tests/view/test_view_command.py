@@ -46,6 +46,7 @@ def test_view_waits_for_a_run_and_ends_quietly_with_ctrl_c(launched):
     assert "Traceback" not in viewer.stderr
 
 
+@pytest.mark.slow
 def test_view_ends_with_ctrl_c_while_a_page_is_open(launched):
     viewer = launched("view", "--no-browser")
 

@@ -208,6 +208,7 @@ LOOPS: dict[str, dict[str, Any]] = {
 QUICK = ("all",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loop", [*QUICK, *slowly(name for name in LOOPS if name not in QUICK)])
 def test_every_body_moves_as_in_an_independent_program_of_the_whole_loop(loop):
     pressed = scene(**PRESSED | LOOPS[loop])

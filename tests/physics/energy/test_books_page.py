@@ -73,6 +73,7 @@ def test_an_example_with_a_wrong_sign_or_the_wrong_book_leaves_much(
     assert left_over(names) > 1e-3
 
 
+@pytest.mark.slow
 def test_the_example_prints_what_the_page_shows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -84,6 +84,7 @@ def swing_in_the_wall(amplitude: float, delay_steps: int, virtual: float) -> np.
     return np.abs(ran.plant["x"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("delay", "virtual"), [(0, 0.0), (13, 0.3), (20, 0.5)])
 def test_coulomb_friction_makes_a_limit_cycle_that_is_left_to_rest_inside_and_to_growth_outside(delay, virtual):
     """Amplitude 4 fc / (pi w (K T/2 + K td - b - B)) within 10 % (Abbott and Okamura 2005): it is unstable."""

@@ -40,6 +40,7 @@ def test_blocks_of_any_size_give_the_same_summary_of_every_shipped_scene(path, d
         assert in_blocks(scene, block_ticks) == usual
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [13, *slowly([0, 10, 50])])
 def test_processes_with_small_blocks_and_the_least_window_give_the_bits_of_one_process(delay, tmp_path):
     """A swap in mid-contact, half a second after it, with commands in flight."""
