@@ -100,8 +100,9 @@ def _hann(count: int) -> Floats:
 
 
 def _least_squares(columns: list[Floats], x_m: Floats) -> Floats:
+    """Returns the shares of the columns, by their normal equations: two sines and the slope of one are far from alike."""
     rows = np.array(columns)
-    return np.linalg.lstsq(rows @ rows.T, rows @ x_m, rcond=None)[0]
+    return np.asarray(np.linalg.lstsq(rows @ rows.T, rows @ x_m, rcond=None)[0], np.float64)
 
 
 def _counts_m(x_m: Floats) -> float:
