@@ -100,7 +100,7 @@ def _hann(count: int) -> Floats:
 
 
 def _least_squares(columns: list[Floats], x_m: Floats) -> Floats:
-    """Returns the shares of the columns, by their normal equations: two sines and the slope of one are far from alike."""
+    """Returns the shares of columns by their normal equations: two sines and the slope of one are far from alike."""
     rows = np.array(columns)
     return np.asarray(np.linalg.lstsq(rows @ rows.T, rows @ x_m, rcond=None)[0], np.float64)
 
