@@ -200,6 +200,11 @@ def test_a_name_in_extends_that_is_no_file_is_told_with_its_line_and_the_one_tha
     assert (f"; did you mean {meant}?" in mistake) if meant else ("did you mean" not in mistake)
 
 
+def test_no_file_is_taken_to_have_meant_itself(files):
+    [mistake] = file_mistakes(files(top='extends = "topp.toml"\nduration = 1.0\n'))
+    assert "did you mean top.toml" not in mistake
+
+
 def test_beside_a_file_that_is_absent_the_mistakes_of_the_others_are_told_and_no_key_that_it_may_hold(files):
     wrong = 'extends = ["gone.toml", "below.toml"]\nduraton = 1.0\n[hand.force]\nvalue = 1.0\n'
     found = file_mistakes(files(top=wrong, below='duration = "1 m"\n[wall]\nstiffnes = 3\n'))

@@ -144,8 +144,8 @@ def scene_model(kinds: Mapping[str, type[Element]], named: Mapping[str, Any] | N
         return _scene_model(tuple(kinds.items()), None)
     wall, asked = named.get("wall"), _kinds_in(named)
     is_plain = isinstance(wall, dict) and wall.keys() <= _SPRING_KEYS
-    asked_for = {kind: element for kind, element in kinds.items() if kind in asked} or kinds
-    return _scene_model(tuple(asked_for.items()), frozenset(named), is_plain)
+    asked_for = [known for known in kinds.items() if known[0] in asked] or [*kinds.items()][:1]
+    return _scene_model(tuple(asked_for), frozenset(named), is_plain)
 
 
 def _kinds_in(tables: Mapping[str, Any]) -> list[Any]:

@@ -164,14 +164,14 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
             _read(layers, file, (*chain, here))
         else:
             line = line_in(str(path), ("extends",))
-            layers.gone_over.append(Mistake(shown(path), "extends", *_absent(name, path.parent), line=line))
+            layers.gone_over.append(Mistake(shown(path), "extends", *_absent(name, path), line=line))
             layers.lacks_a_file = True
     layers.lay(table, str(path))
 
 
-def _absent(name: str, folder: Path) -> tuple[str, str, str | None]:
-    """Returns what was found and expected of a name that is no file, and the nearest of those that are."""
-    own = {file.name for file in folder.glob("*.toml")}
+def _absent(name: str, of: Path) -> tuple[str, str, str | None]:
+    """Returns what was found and expected of a name in ``of`` that is no file, and the nearest of those that are."""
+    own = {file.name for file in of.parent.glob("*.toml")} - {of.name}
     theirs = {f"{kind}/{one}.toml" for kind in ("devices", "hands", "scenes") for one in bundled(kind)}
     meant = nearest(name if name.endswith(".toml") else f"{name}.toml", sorted(own | theirs))
     if meant is None and (stem := nearest(Path(name).stem, [Path(one).stem for one in sorted(theirs)])):
