@@ -80,7 +80,7 @@ def a_tenth_stiffer(device: str, hold_N: float, stiffness_N_m: float, sizes: Seq
     choices = [np.zeros(3), *(share * largest * only for share, only in product(shares, np.eye(3)))]
     choices += [largest * (b, 0.0, m) for b, m in product(shares[2::2], shares[3::2])]
     sizes = np.array([*choices, *around])
-    return [*sizes[safe(device, hold_N, np.full(len(sizes), 1.1 * stiffness_N_m), sizes, most=24)]]
+    return [*sizes[safe(device, hold_N, np.full(len(sizes), 1.1 * stiffness_N_m), sizes, most=64)]]
 
 
 def test_the_wall_that_was_once_advised_for_the_premium_buzzes_at_every_hold_in_nearly_every_corner():
