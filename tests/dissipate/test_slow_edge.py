@@ -20,7 +20,7 @@ def finder(t_s: Floats, x_m: Floats) -> BuzzFinder:
 
 @pytest.mark.parametrize(("seconds", "phase"), [(3.0, 2.2), *SLOW])
 @pytest.mark.parametrize("drift", [False, True])
-@pytest.mark.parametrize("noise_m", [2e-5])
+@pytest.mark.parametrize("noise_m", [2e-5, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_a_swing_from_1_5_to_4_hz_is_told_right_or_not_at_all(
     seconds: float, phase: float, drift: bool, noise_m: float
 ) -> None:

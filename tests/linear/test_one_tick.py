@@ -49,7 +49,7 @@ def unexplained(x: np.ndarray, growths: np.ndarray) -> float:
     return float(np.abs(swings - fitted).max() / np.abs(swings).max())
 
 
-@pytest.mark.parametrize("seed", [*SEEDS[::4], *slowly(SEEDS[1::4])])
+@pytest.mark.parametrize("seed", [*SEEDS[::4], *slowly(seed for at, seed in enumerate(SEEDS) if at % 4)])
 def test_a_run_in_contact_moves_by_the_eigenvalues_of_its_map_and_by_no_others(seed: int) -> None:
     made = linear_scene(seed)
     loop = OneTickMap.from_scene(made)

@@ -15,7 +15,7 @@ from haploop.view.look.spectrum import Line, line_at, lobe, main_line
 # Of several swings, of which these are the most, each has so much of the variance, and peaks are so many lines apart.
 _MOST, _OF_EACH, _APART = 3, 0.1, 2
 # The staircase of an encoder swings by less than a count, here the step that nine of ten exceed.
-COUNTS, _SMALLEST = 2, 0.1
+COUNTS, _SMALLEST = 2, 10.0
 # Of a swing within the counts their rounding leaves so much of the variance; the staircase of a steady motion has 0.61
 # of its own in its first line.
 _ROUNDED = 0.68
@@ -69,15 +69,15 @@ def _beside_drift(line: Line, x_m: Floats, rate_Hz: float, band: Band) -> Line |
         weighted = weight * column
         return weighted - drift @ (drift.T @ weighted)
 
-    rest_m, fit = rest(x_m), np.zeros(0)
+    def sines(periods: float) -> list[Floats]:
+        return [np.cos(np.pi * periods * t), np.sin(np.pi * periods * t)]
+
+    rest_m = rest(x_m)
+    fit = _least_squares([rest(each) for each in sines(periods)], rest_m)
     for _ in range(_STEPS):
-        turn = np.pi * periods * t
-        cosine, sine = np.cos(turn), np.sin(turn)
-        columns = [rest(cosine), rest(sine)]
-        if not len(fit):
-            fit = _least_squares(columns, rest_m)
-        slope = rest(np.pi * t * (fit[1] * cosine - fit[0] * sine))
-        fit = _least_squares([*columns, slope], rest_m)
+        cosine, sine = sines(periods)
+        slope = np.pi * t * (fit[1] * cosine - fit[0] * sine)
+        fit = _least_squares([rest(cosine), rest(sine), rest(slope)], rest_m)
         step = float(fit[2])
         if abs(step) < _STILL:
             return Line(periods * rate_Hz / count, 2.0 * float(np.hypot(fit[0], fit[1])), line.share)
@@ -108,8 +108,7 @@ def _least_squares(columns: list[Floats], x_m: Floats) -> Floats:
 def _counts_m(x_m: Floats) -> float:
     """Returns how wide the staircase of an encoder may swing."""
     steps = np.abs(np.diff(x_m))
-    steps = np.sort(steps[steps > 0.0])
-    return COUNTS * float(np.interp(_SMALLEST * (len(steps) - 1), np.arange(len(steps)), steps)) if len(steps) else 0.0
+    return COUNTS * float(np.percentile(steps[steps > 0.0], _SMALLEST)) if steps.any() else 0.0
 
 
 def fast_rms_m(spectrum: Spectrum) -> float:
