@@ -67,7 +67,7 @@ def test_an_observer_hears_every_tick_of_all_three_streams_and_every_event_at_it
 @pytest.mark.slow
 def test_one_that_does_not_listen_costs_the_run_no_bit_and_is_told_what_it_missed(tmp_path):
     """Blocks so short that there are far more of them than any queue holds."""
-    with going(tmp_path, "duration=20", "run.block_ticks=10", pauses=(7, 19_000)) as subject:
+    with going(tmp_path, "duration=2", "run.block_ticks=1", pauses=(7, 1900)) as subject:
         subject.stands_at(7)
         context = subject.live.make_context()
         observer = Observer(context, "view", subject.live.clock, ALL)
@@ -76,7 +76,7 @@ def test_one_that_does_not_listen_costs_the_run_no_bit_and_is_told_what_it_misse
                 observer.wait(200)
                 observer.poll()
             subject.ask("resume")
-            subject.stands_at(19_000)
+            subject.stands_at(1900)
             for _ in range(10):  # it wakes up, and takes what its queues still hold
                 observer.wait(50)
                 observer.poll()
