@@ -179,7 +179,10 @@ def too_long(name: str, delay_s: float, control_rate: int) -> list[str]:
 
 # A block that takes no longer than this is never far behind what a viewer shows or a killed run leaves in its log.
 AT_MOST_S = 0.1
-# A shorter block is not worth its messages: where time is granted tick by tick, so much of it makes a block.
+# A shorter block is not worth its messages: where time is granted tick by tick, so much of it makes a block, which is
+# what a page shows at once.
+_WORTH_S = 0.03
+# What is held back is told all the same where for so long no more is granted.
 HELD_S = 0.01
 _FIRST_TICKS = 100
 
@@ -202,8 +205,8 @@ class BlockLength:
         self._began = wall_clock()
 
     def is_worth_it(self, ticks: int) -> bool:
-        """Tells whether so many ticks make a block: it is full, or has taken ``HELD_S``."""
-        return ticks >= self.ticks or self._wall_clock() - self._began >= HELD_S
+        """Tells whether so many ticks make a block: it is full, or has taken 0.03 s."""
+        return ticks >= self.ticks or self._wall_clock() - self._began >= _WORTH_S
 
     def next(self) -> None:
         """Ends a block; doubles the length after a fast one, halves it after a slow one."""
