@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from haploop.logger.verdict.about_trend import about_trend
+
 # Widths below this are rounding.
 LEAST_WIDTH_M = 1e-15
 # Frequency in Hz and smallest amplitude in m that is felt, 0 to peak (Israr, Choi and Tan 2006, three of their points).
@@ -34,10 +36,7 @@ def widths(x: np.ndarray, size: int) -> np.ndarray:
     ``x`` is of shape (..., samples), the result of shape (..., pieces); samples left over come first.
     """
     pieces = x[..., x.shape[-1] % size :].reshape(*x.shape[:-1], -1, size)
-    t = np.arange(size) - (size - 1) / 2.0
-    offset = pieces - pieces.mean(axis=-1, keepdims=True)
-    offset -= t * (np.vecdot(offset, t) / np.vecdot(t, t))[..., None]
-    return np.ptp(offset, axis=-1)
+    return np.ptp(about_trend(pieces), axis=-1)
 
 
 def level_widths(x: np.ndarray, size: int) -> np.ndarray:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from haploop.logger.verdict.about_trend import about_trend
 from haploop.logger.verdict.ripple import peak_to_peak, ripple
 
 WINDOW_S = 0.5
@@ -228,13 +228,6 @@ def _means(values: np.ndarray, counted: np.ndarray) -> list[float | None]:
     return [float(np.add.reduce(row)) / len(row) if len(row) else None for row in chosen]
 
 
-@lru_cache(maxsize=4)
-def _centred(count: int) -> tuple[np.ndarray, float]:
-    """Returns so many equal steps around 0, and the sum of their squares."""
-    t = np.arange(count) - (count - 1) / 2.0
-    return t, np.dot(t, t)
-
-
 def swings(x: np.ndarray, swing_m: np.ndarray) -> tuple[list[int], list[float]]:
     """Counts how often x swings across its straight trend by more than ``swing_m``, and measures how the width grows.
 
@@ -248,9 +241,7 @@ def swings(x: np.ndarray, swing_m: np.ndarray) -> tuple[list[int], list[float]]:
     runs, steps = x.shape
     if steps < 4:
         return [0] * runs, [0.0] * runs
-    t, square = _centred(steps)
-    offset = x - x.mean(axis=1)[:, None]
-    offset -= t * (np.vecdot(t, offset) / square)[:, None]
+    offset = about_trend(x)
     side = np.zeros((runs, steps + 1), np.int8)  # each run begins on neither side
     np.subtract((offset > swing_m[:, None]).view(np.int8), (offset < -swing_m[:, None]).view(np.int8), out=side[:, 1:])
     sides = side.ravel()

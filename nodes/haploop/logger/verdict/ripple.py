@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from haploop.logger.verdict.about_trend import about_trend
+
 # Swings of the command slower than this are the hand's and the task's; faster ones are felt as a buzz.
 RIPPLE_ABOVE_HZ = 30.0
 
@@ -34,9 +36,7 @@ def peak_to_peak(force_N: np.ndarray) -> np.ndarray:
 def above(force_N: np.ndarray, rate: float) -> np.ndarray:
     """Returns what of a force, or of another trace, is faster than ``RIPPLE_ABOVE_HZ``, without its ends."""
     count = force_N.shape[-1]
-    t = np.arange(count) - (count - 1) / 2.0
-    offset = force_N - force_N.mean(axis=-1, keepdims=True)
-    offset -= t * (np.vecdot(offset, t) / np.vecdot(t, t))[..., None]
+    offset = about_trend(force_N)
     spectrum = np.fft.rfft(np.concatenate([offset, offset[..., ::-1]], axis=-1))
     spectrum[..., np.fft.rfftfreq(2 * count, 1.0 / rate) < RIPPLE_ABOVE_HZ] = 0.0
     left_out = min(round(rate / RIPPLE_ABOVE_HZ), count // 4)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from haploop.logger.verdict.about_trend import about_trend
 from haploop.logger.verdict.measures import CROSSINGS, ROUNDING, SMALLEST_SWING_M, WINDOW_S, swings
 from haploop.view.look.spectrum import main_line
 from haploop.view.store.history import History
@@ -138,7 +139,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
         window=WINDOW_S, begin=by, seen=seen_s, crossings=crossings, growth=growth, swing_um=swing_m * 1e6,
         width_um=width * 1e6, ripple_N=ripple, most_N=max(ripples)[0],
     )  # fmt: skip
-    swing_now_m = float(min(np.ptp(newest[0]), np.ptp(_flat(newest[0]))))
+    swing_now_m = float(min(np.ptp(newest[0]), np.ptp(about_trend(newest[0]))))
     return Sight(
         word, why, long_first / rate, end / rate, so_far, swing_now_m, ripple,
         hertz, stiffness if inside[first - end :].any() else None,
@@ -163,16 +164,9 @@ def _contact(history: History, first: int, end: int) -> tuple[np.ndarray, float 
 def _ripples(force: np.ndarray, size: int) -> list[tuple[float, bool]]:
     """Returns the width of force about its straight trend in windows of a size, the newest first, and if it counts."""
     windows = [force[max(0, stop - size) : stop] for stop in range(len(force), 3, -size)]
-    widths = [float(np.ptp(_flat(window))) for window in windows]
+    widths = [float(np.ptp(about_trend(window))) for window in windows]
     least = [max(_LEAST_RIPPLE_N, _RIPPLE * float(np.abs(window).max())) for window in windows]
     return [(width, width > above) for width, above in zip(widths, least, strict=True)]
-
-
-def _flat(samples: np.ndarray) -> np.ndarray:
-    """Returns samples less their straight trend."""
-    t = np.arange(len(samples)) - (len(samples) - 1) / 2.0
-    flat = samples - samples.mean()
-    return flat - t * ((flat @ t) / (t @ t))
 
 
 def _swings(x: np.ndarray, swing_m: float) -> tuple[int, float]:

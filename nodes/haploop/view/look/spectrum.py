@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from haploop.logger.verdict.about_trend import about_trend
+
 # The line is told where it holds this share of all that swings; below, there are many lines or noise.
 _STANDS_OUT = 0.25
 # Lines this many resolved frequencies beside the highest are part of it: a Hann window is as wide.
@@ -26,8 +28,8 @@ class Line(NamedTuple):
 
 
 @lru_cache(maxsize=8)
-def _time_and_window(count: int) -> tuple[np.ndarray, np.ndarray]:
-    return np.arange(count) - (count - 1) / 2.0, np.hanning(count + 1)[:-1]
+def _hann(count: int) -> np.ndarray:
+    return np.hanning(count + 1)[:-1]
 
 
 def amplitudes(samples: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
@@ -37,10 +39,8 @@ def amplitudes(samples: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray
     ``rate / count``, and the first is above 0.
     """
     count = samples.shape[-1]
-    t, window = _time_and_window(count)
-    flat = samples - samples.mean(axis=-1, keepdims=True)
-    flat = flat - t * (flat @ t / (t @ t))[..., None]
-    found = np.abs(np.fft.rfft(flat * window)) * (2.0 / window.sum())
+    window = _hann(count)
+    found = np.abs(np.fft.rfft(about_trend(samples) * window)) * (2.0 / window.sum())
     return np.fft.rfftfreq(count, 1.0 / rate)[1:], found[..., 1:]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from haploop.logger.verdict.about_trend import about_trend
 from haploop.tools.dissipate.recording.samples import Floats
 
 # A force gives to the swing, or takes, from so much on of what it would at most.
@@ -23,8 +24,8 @@ def fed_W(x_m: Floats, force_N: Floats, rate_Hz: float, frequency_Hz: float, del
     nor what it stores; nor has the rounding of the positions, but for its share in these lines.
     """
     count, window = len(x_m), np.hanning(len(x_m) + 1)[:-1]
-    t, at_Hz = np.linspace(-1.0, 1.0, count), np.fft.rfftfreq(count, 1.0 / rate_Hz)
-    x, force = (np.fft.rfft(window * (u - np.polyval(np.polyfit(t, u, 1), t))) for u in (x_m, force_N))
+    at_Hz = np.fft.rfftfreq(count, 1.0 / rate_Hz)
+    x, force = (np.fft.rfft(window * about_trend(u)) for u in (x_m, force_N))
     given, most = 0.0, 0.0
     for order_Hz in (order * frequency_Hz for order in _ORDERS):
         near, turn = np.abs(at_Hz - order_Hz) < _NEAR * rate_Hz / count, 2j * np.pi * order_Hz

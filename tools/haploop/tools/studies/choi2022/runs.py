@@ -13,6 +13,7 @@ from haploop.launch.scene.bundled import bundled_folder
 from haploop.launch.scene.file import load
 from haploop.logger.log.recording import MemoryLog, Recording
 from haploop.logger.summary import Summary
+from haploop.logger.verdict.about_trend import about_trend
 from haploop.protocol.scene.scene import Hand, Scene, Wall, by_window
 
 _LAST_S = 0.5
@@ -61,7 +62,7 @@ def spectrum(log: Recording) -> tuple[np.ndarray, np.ndarray]:
     t, x = log["/plant"]["t"], log["/plant"]["x"]
     last = t >= t[-1] - _LAST_S
     t, x = t[last], x[last]
-    x = x - np.polyval(np.polyfit(t - t[0], x, 1), t - t[0])
+    x = about_trend(x)
     window = np.hanning(len(x))
     amplitudes = np.abs(np.fft.rfft(x * window)) / window.sum() * 2.0 * np.sqrt(2.0 / 3.0)
     return np.fft.rfftfreq(len(x), t[1] - t[0]), amplitudes
