@@ -54,12 +54,19 @@ def swaying() -> list[Scene]:
     return shipped("fig6a", [20.0, 30.0, 200.0], hand=Hand(force=Sine(amplitude=-0.5, frequency=0.75, offset=-0.65)))
 
 
+def within_counts() -> list[Scene]:
+    """A Premium 1.5 without friction that rests everywhere within a count, at one place of it, and nowhere."""
+    base = replace(load("demo", ["event=[]"]), duration=0.8, friction=None)
+    return [with_value(base, "wall.stiffness", k) for k in (200.0, 583.0, 850.0)]
+
+
 FAMILIES: dict[str, Callable[[], list[Scene]]] = {
     "plain": lambda: shipped("fig6a", [20.0, 3000.0]),
     "inertia": lambda: shipped("fig6c", [20.0, 60.0]),
     "trembling": trembling,
     "friction": rubbing,
     "swaying": swaying,
+    "counts": within_counts,
     "devices that rub": devices,
     "observing": lambda: [observed(k, run={"verdict": "pushed"}) for k in (300.0, 2000.0)],
 }
@@ -81,6 +88,7 @@ def test_a_loop_judged_among_others_has_the_words_and_bits_it_has_alone(family):
     assert [told(result) for result in together] == [told(result) for result in alone]
     assert len({result["verdict"] for result in alone}) > 1
     assert any(result["stability"].get("at_hardest") for result in alone) == (family == "swaying")
+    assert any(result["stability"].get("deeper") == "swings on" for result in alone) == (family == "counts")
     assert any(result["stability"].get("frictionless") for result in alone) == (
         family in ("friction", "devices that rub")
     )

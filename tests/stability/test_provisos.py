@@ -24,7 +24,7 @@ from helpers.scenes.unseen_loops import drawn
 
 
 def with_friction_asked(of) -> Finding:
-    return judge(ended(of), LOOKS_S, frictionless=True)
+    return judge(ended(of), LOOKS_S, thorough=True)
 
 
 @pytest.mark.slow

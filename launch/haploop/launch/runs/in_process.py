@@ -138,6 +138,6 @@ class Loop:
         def find() -> Finding:
             [inside] = logger.window.contacts(np.zeros(1, np.intp))
             end = end_at(self._scene, self._plant, self._controller, inside)
-            return judge(end, LOOKS_S, frictionless=True) if isinstance(end, End) else end
+            return judge(end, LOOKS_S, thorough=True) if isinstance(end, End) else end
 
         return with_verdict(self._scene, summary, find, out)

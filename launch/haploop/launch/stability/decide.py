@@ -9,7 +9,7 @@ from typing import Any
 
 from haploop.launch.stability.swing import REST_M, SAME, Swing
 from haploop.launch.stability.traces import is_felt, smallest_felt_m
-from haploop.launch.stability.why import AFTER_BLOW, AT_HARDEST, DECAYING, FRICTIONLESS, WHY
+from haploop.launch.stability.why import AFTER_BLOW, AT_HARDEST, DECAYING, DEEPER, FRICTIONLESS, WHY
 from haploop.logger.verdict.measures import WINDOW_S
 
 # A swing that dies is watched until it is this small, or for long.
@@ -84,7 +84,11 @@ class Finding:
         blow_N: of a loop that rests after the push, a harder one, into the wall and off it; None if not asked.
         blown: what it does after these: rests, rests off the wall, swings on, or undecided; None if not asked.
         frictionless: what a loop that rests, too, after these would do after the push without its friction: rests,
-            swings on, or undecided; None if not asked, and of a loop without.
+            swings on, swings on deeper, by a part of an encoder's count, or undecided; None if not asked, and of a loop
+            without.
+        deeper_N: of a loop without friction that rests, by how much harder the hand holds it where it lies a part of an
+            encoder's count deeper; None if not asked, and without counts.
+        deeper: what it does there: rests, swings on, or undecided; None if not asked.
         hardest_N: of a loop that rests then, too, the hardest hold that its hand came to; None if that was about the
             last one, or the hand stays.
         at_hardest: what it does there: rests, swings on, or undecided; None if not asked.
@@ -111,6 +115,8 @@ class Finding:
     frictionless: str | None = None
     hardest_N: float | None = None
     at_hardest: str | None = None
+    deeper_N: float | None = None
+    deeper: str | None = None
     settles_s: float | None = None
     memory_drifts: bool = False
     detail: str = ""
@@ -132,6 +138,23 @@ class Finding:
         does = _DOES.get(found.word, "undecided")
         drift = self.memory_drifts or found.memory_drifts
         told = replace(self, hardest_N=abs(hold_N), at_hardest=does, memory_drifts=drift)
+        return told if does == "rests" else replace(told, word="undecided", why="rested")
+
+    @property
+    def rests_freely(self) -> bool:
+        """Tells whether it rests without friction, wherever it was held."""
+        return self.word == "steady" and self.frictionless in (None, "rests")
+
+    def held_deeper(self, more_N: float, found: Finding) -> Finding:
+        """Returns the finding of a loop that rests with what was found a part of a count deeper, without friction.
+
+        One that has none is undecided unless it rests there, too.
+        """
+        does = _DOES.get(found.word, "undecided")
+        if self.frictionless:
+            return replace(self, frictionless=f"{does} deeper" if does == "swings on" else does)
+        drift = self.memory_drifts or found.memory_drifts
+        told = replace(self, deeper_N=abs(more_N), deeper=does, memory_drifts=drift)
         return told if does == "rests" else replace(told, word="undecided", why="rested")
 
     def without_friction(self, found: Finding) -> Finding:
@@ -162,7 +185,7 @@ class Finding:
         if self.word == "limit-cycle":
             return [UNFELT] * (not self.felt) + [OTHER_WIDTH] * (not beside and self._is_other(seen_m))
         holds = {
-            "only friction holds it": self.frictionless == "swings on",
+            "only friction holds it": self.frictionless in ("swings on", "swings on deeper"),
             "perhaps only friction holds it": self.frictionless == "undecided",
             "an element's memory still changes": self.memory_drifts,
             "at some holds of its hand": HAND_MOVES in beside,
@@ -204,6 +227,7 @@ class Finding:
         sentence = WHY[self.why].format(**numbers, width=width, width_um=width_um, run=run, decaying=self._decaying())
         sentence += AFTER_BLOW[self.blown].format(**numbers) if self.blown else ""
         sentence += AT_HARDEST[self.at_hardest].format(**numbers) if self.at_hardest else ""
+        sentence += DEEPER[self.deeper].format(**numbers) if self.deeper else ""
         return sentence + (FRICTIONLESS[self.frictionless] if self.frictionless else "")
 
 

@@ -28,7 +28,7 @@ from haploop.launch.stability.looks import (
     watch_times,
 )
 from haploop.launch.stability.memory_drift import may_act
-from haploop.launch.stability.still_hand import End, StillHand, harder_hold, hold_of
+from haploop.launch.stability.still_hand import End, StillHand, deeper_holds, harder_hold, hold_of
 from haploop.launch.stability.swing import REST_M
 from haploop.logger.summary import Summary, finite, write_summary
 from haploop.logger.verdict.measures import window_span
@@ -47,7 +47,7 @@ def judge_scene(
     looks_s: Sequence[float] = PATIENT_S,
     *,
     blows: Sequence[float] = BLOWS,
-    frictionless: bool = False,
+    thorough: bool = False,
     on_exchange: Callable[[], object] = lambda: None,
 ) -> Finding:
     """Runs a resolved scene to its end and judges that end.
@@ -58,7 +58,7 @@ def judge_scene(
         events: (tick, event) in order; the scene's own when None.
         looks_s: times since the push at which the loop is looked at until it tells.
         blows: what one that rests is struck with, as shares of its push.
-        frictionless: whether one that rests is pushed without its friction, too.
+        thorough: whether one that rests is tried without its friction and elsewhere within an encoder's count, too.
         on_exchange: called whenever the plant asks for commands.
 
     Raises:
@@ -66,7 +66,7 @@ def judge_scene(
         ArithmeticError: the plant's arithmetic failed.
     """
     end = end_of(scene, kinds, events, on_exchange)
-    return judge(end, looks_s, blows=blows, frictionless=frictionless) if isinstance(end, End) else end
+    return judge(end, looks_s, blows=blows, thorough=thorough) if isinstance(end, End) else end
 
 
 def end_of(
@@ -152,7 +152,7 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
 
 
 def judge(
-    end: End, looks_s: Sequence[float] = PATIENT_S, *, blows: Sequence[float] = BLOWS, frictionless: bool = False
+    end: End, looks_s: Sequence[float] = PATIENT_S, *, blows: Sequence[float] = BLOWS, thorough: bool = False
 ) -> Finding:
     """Returns whether a loop forgets its start, from the end of a run in contact on.
 
@@ -160,8 +160,9 @@ def judge(
     are pushed, one ten times as hard as the other. Whatever moves a second later is the loop's own. Most loops tell
     within a second or two; slow ones are watched to the last look. It takes as long as simulating that time twice. One
     that comes to rest is struck, too, into the wall and off it, which takes as long again. Friction stops small
-    swings of an unstable loop, but wide ones not: where somebody asks, what rests is pushed without it as well. A loop
-    that rests at the last hold of a hand that moves is judged at its hardest hold, too.
+    swings of an unstable loop, but wide ones not: where somebody asks, what rests is pushed without it as well, and
+    what rests without friction also where it lies a third and two thirds of an encoder's count deeper. A loop that
+    rests at the last hold of a hand that moves is judged at its hardest hold, too.
     """
     push_N = push_of(end.hold_N, end.scene.hand, end.wall_m)
     pushes_N = push_N * SMALLER, push_N
@@ -178,9 +179,19 @@ def judge(
         harder_N = harder_hold(end.scene, end.time, end.plant.reached, end.hold_N, end.wall_m)
     if harder_N is not None:
         found = found.held_harder(harder_N, judge(replace(end, hold_N=harder_N), looks_s, blows=blows))
-    if frictionless and is_struck(found) and end.scene.friction:
-        free = replace(end, scene=replace(end.scene, friction=Friction(kinetic=0.0)))
-        found = found.without_friction(_watched(free, pushes_N, LOOKS_S)[0])
+    return _elsewhere(end, pushes_N, found) if thorough and is_struck(found) else found
+
+
+def _elsewhere(end: End, pushes_N: tuple[float, ...], found: Finding) -> Finding:
+    """Returns the finding of a loop that rests with what it does without its friction, and elsewhere within a count."""
+    if end.scene.friction:
+        end = replace(end, scene=replace(end.scene, friction=Friction(kinetic=0.0)))
+        found = found.without_friction(_watched(end, pushes_N, LOOKS_S)[0])
+    for hold_N in deeper_holds(end.scene, end.controller.params.wall, end.hold_N):
+        if found.rests_freely:
+            push_N = push_of(hold_N, end.scene.hand, end.wall_m)
+            there = _watched(replace(end, hold_N=hold_N), (push_N * SMALLER, push_N), LOOKS_S)[0]
+            found = found.held_deeper(hold_N - end.hold_N, there)
     return found
 
 

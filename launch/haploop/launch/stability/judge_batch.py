@@ -24,10 +24,10 @@ from haploop.launch.stability.looks import (
 )
 from haploop.launch.stability.memory_drift import may_act
 from haploop.launch.stability.still_batch import StillBatch
-from haploop.launch.stability.still_hand import harder_hold, hold_of
+from haploop.launch.stability.still_hand import deeper_holds, harder_hold, hold_of
 from haploop.launch.stability.swing import REST_M
 from haploop.protocol.scene.effects import Friction
-from haploop.protocol.trees import tree_take
+from haploop.protocol.trees import tree_member, tree_take
 from haploop.protocol.walls.wall import Wall
 
 # Members of a batch that are judged together.
@@ -45,7 +45,7 @@ def judge_batch(end: BatchEnd, looks_s: Sequence[float] = LOOKS_S) -> list[Findi
     hold_N = np.array([hold_of(end.scenes[i], end.time, end.tick, end.inside[i]) for i in touching])
     for first in range(0, len(touching), MOST):
         some, held_N = touching[first : first + MOST], hold_N[first : first + MOST]
-        judged = _without_friction(end, some, held_N, _judge_some(end, some, held_N, looks_s))
+        judged = _elsewhere(end, some, held_N, _judge_some(end, some, held_N, looks_s))
         for place, finding in zip(some, judged, strict=True):
             found[place] = finding
     return found
@@ -79,16 +79,32 @@ def _harder(end: BatchEnd, member: int, hold_N: float) -> float | None:
     return harder_hold(end.scenes[member], end.time, end.tick, hold_N, _wall_m(end, member))
 
 
-def _without_friction(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, found: list[Finding]) -> list[Finding]:
-    """Returns the findings; of each loop that rests, also whether it would without its friction."""
-    rests = [place for place, each in enumerate(found) if is_struck(each)]
-    if not rests or not end.scenes[0].friction:
-        return found
-    free = end._replace(scenes=[replace(scene, friction=Friction(kinetic=0.0)) for scene in end.scenes])
-    push_N = _pushes(end, members[rests], hold_N[rests])
-    alike, _ = _watched(free, members[rests], hold_N[rests], push_N, (SMALLER, 1.0), LOOKS_S)
-    told = dict(zip(rests, alike, strict=True))
-    return [each.without_friction(told[place]) if place in told else each for place, each in enumerate(found)]
+def _elsewhere(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, found: list[Finding]) -> list[Finding]:
+    """Returns the findings; of each loop that rests, with what it does without its friction, and within a count."""
+    found, rests = list(found), [place for place, each in enumerate(found) if is_struck(each)]
+    if rests and end.scenes[0].friction:
+        end = end._replace(scenes=[replace(scene, friction=Friction(kinetic=0.0)) for scene in end.scenes])
+        for place, free in _pushed(end, members, dict(zip(rests, hold_N[rests].tolist(), strict=True))).items():
+            found[place] = found[place].without_friction(free)
+    deeper = {place: _deeper(end, members[place], float(hold_N[place])) for place in rests}
+    for nth in range(max(map(len, deeper.values()), default=0)):
+        holds = {place: deeper[place][nth] for place in rests if found[place].rests_freely and deeper[place]}
+        for place, there in _pushed(end, members, holds).items():
+            found[place] = found[place].held_deeper(holds[place] - float(hold_N[place]), there)
+    return found
+
+
+def _deeper(end: BatchEnd, member: int, hold_N: float) -> list[float]:
+    return deeper_holds(end.scenes[member], tree_member(end.params.wall, member), hold_N)
+
+
+def _pushed(end: BatchEnd, members: np.ndarray, holds_N: dict[int, float]) -> dict[int, Finding]:
+    """Returns what is found at holds of some places after both pushes, by place."""
+    if not holds_N:
+        return {}
+    some, hold_N = members[[*holds_N]], np.array([*holds_N.values()])
+    found, _ = _watched(end, some, hold_N, _pushes(end, some, hold_N), (SMALLER, 1.0), LOOKS_S)
+    return dict(zip(holds_N, found, strict=True))
 
 
 def _watched(

@@ -16,6 +16,7 @@ from haploop.plant.plant import Plant
 from haploop.protocol.scene.hand_force import Constant, constant_from_s
 from haploop.protocol.scene.scene import Hand, Scene
 from haploop.protocol.ticks import Timebase
+from haploop.protocol.walls.wall import Wall
 
 # A push lasts this long.
 PUSH_S = 0.05
@@ -25,6 +26,8 @@ _HOLD_S, _LATEST_S = 0.25, 60.0
 _HARDER = 1.2
 # A hand that presses by less holds nothing.
 LEAST_PRESS_N = 1e-3
+# So much of an encoder's count deeper a loop is held that rests.
+_DEEPER = (1.0 / 3.0, 2.0 / 3.0)
 
 
 @dataclass(frozen=True)
@@ -149,6 +152,37 @@ def press_of(hold_N: float, hand: Hand | None, wall_m: float) -> float:
     """Returns by how much a hand held at a force presses, N: with its spring at the wall, where that presses more."""
     with_spring_N = hold_N + hand.stiffness * (hand.rest - wall_m) if hand else hold_N
     return max(hold_N, with_spring_N, key=abs)
+
+
+def deeper_holds(scene: Scene, wall: Wall, hold_N: float) -> list[float]:
+    """Returns holds by which the device rests a third and two thirds of an encoder's count deeper, N; none without one.
+
+    What a wall answers behind an encoder hangs on where within a count the device rests: a loop that rests at one hold
+    may chatter at the next. The force that is missing is that of wall and hand on the way, at most V'(p + q) - V'(p)
+    and k q, where V'(p) is what the hand presses with, q the count and k the stiffness of the hand through its grip.
+    """
+    press_N = press_of(hold_N, scene.hand, wall.position)
+    if scene.encoder is None or not wall.inward:
+        return []
+    count_m, depth_m = scene.encoder.resolution, _depth_of(wall, abs(press_N))
+    count_N = wall.held(depth_m + count_m) - wall.held(depth_m) + _stiffness_of(scene.hand) * count_m
+    return [hold_N + math.copysign(part * count_N, press_N) for part in _DEEPER] if count_N > 0.0 else []
+
+
+def _depth_of(wall: Wall, press_N: float) -> float:
+    """Returns the depth, m, at which a wall answers a press; that of a metre where it answers with less."""
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if wall.held(middle) < press_N else (low, middle)
+    return high
+
+
+def _stiffness_of(hand: Hand | None) -> float:
+    """Returns the stiffness of a hand, felt through its grip, N/m."""
+    if hand is None or not hand.stiffness:
+        return 0.0
+    return 1.0 / (1.0 / hand.stiffness + (1.0 / hand.grip.stiffness if hand.grip else 0.0))
 
 
 def harder_hold(scene: Scene, time: Timebase, last: int, hold_N: float, wall_m: float) -> float | None:

@@ -42,8 +42,16 @@ AT_HARDEST = {
     "swings on": " At the hand's hardest hold, {hardest_N:.3g} N, it swings on.",
     "undecided": " Whether it does at the hand's hardest hold, {hardest_N:.3g} N, could not be told.",
 }
+DEEPER = {
+    "rests": " It does where it lies parts of an encoder's count deeper, too.",
+    "swings on": " Held {deeper_N:.2g} N harder, a part of an encoder's count deeper, it swings on.",
+    "undecided": " Whether it does held {deeper_N:.2g} N harder, a part of an encoder's count deeper, could not be "
+    "told.",
+}
 FRICTIONLESS = {
     "rests": " Held so it would without its friction, too.",
     "swings on": " Only friction holds it: without, its swing would last or grow.",
+    "swings on deeper": " Only friction holds it: without, its swing would last or grow a part of an encoder's count "
+    "deeper.",
     "undecided": " Whether it would without its friction could not be told.",
 }

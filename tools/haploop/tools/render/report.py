@@ -228,6 +228,8 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
         rows.append(("settles within", f"{amount(settles_s, 's')}, to 5 %"))
     if blown := found.get("blown"):
         rows.append(("after a blow", f"of {amount(found['blow_N'], 'N')}: {blown}"))
+    if deeper := found.get("deeper"):
+        rows.append(("deeper within a count", f"held {amount(found['deeper_N'], 'N')} harder: {deeper}"))
     if frictionless := found.get("frictionless"):
         rows.append(("without its friction", frictionless))
     return rows

@@ -37,6 +37,7 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
     growth: `${fixed(rate)} ± ${fixed(error, 2)} 1/s`,
     ...(isNumber(found.settles_s) ? { "settles within": `${amount(found.settles_s, "s")}, to 5 %` } : {}),
     ...(found.blown ? { [`after a blow of ${amount(found.blow_N, "N")}`]: found.blown } : {}),
+    ...(found.deeper ? { [`held ${amount(found.deeper_N, "N")} harder`]: found.deeper } : {}),
     ...(found.frictionless ? { "without its friction": found.frictionless } : {}),
     ...(isNumber(found.own_share) ? { "its own in the run's swing": share(found.own_share) } : {}),
   };
