@@ -119,6 +119,11 @@ def _exact(unit: str) -> tuple[Exponents, Decimal] | None:
     return total, scale
 
 
+def is_unit(text: str) -> bool:
+    """Tells whether a text is one of the units that texts are mostly written in, such as ``mm`` or ``N s/m``."""
+    return bool(text.strip()) and _exact(text.strip()) is not None
+
+
 def is_exotic(text: str) -> bool:
     """Tells whether a text is a number with a unit that pint alone may know."""
     match = _TEXT.fullmatch(text)

@@ -15,12 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
-from haploop.launch.scene.units import is_number, name_and_unit
+from haploop.launch.scene.units import is_number, is_unit, name_and_unit
 from haploop.protocol.files import demand_regular
 from haploop.protocol.names import nearest
 from haploop.tools.dissipate.recording.samples import Floats, RecordingError
 
 _BLOCK_ROWS = 16_384
+# What a cell without a value may hold.
+_MISSING = ("", "-", "--", "na", "n/a", "none", "null")
 
 
 @dataclass(frozen=True)
@@ -33,13 +35,17 @@ class Column:
 
 
 class DelimitedFile:
-    """Reads text of one row a line; a header line, lines that begin with # and empty lines may be there.
+    """Reads text of one row a line; lines of a title, a header, a row of units, lines that begin with # and empty ones
+    may be there.
 
-    Cells are separated by tabs, semicolons, commas or blanks, whichever the first row has, in this order. With
-    semicolons a comma is taken for the decimal point.
+    The first row with a number begins the table: its cells are separated by tabs, semicolons, commas or blanks,
+    whichever it has, in this order. With semicolons a comma is taken for the decimal point. The row above is the
+    header; where half of its cells are units and the one above has as many, they are its units. What stands above is a
+    title.
 
     Attributes:
         columns: by the names of the header, or numbered from 1.
+        title: number of lines above the header.
     """
 
     def __init__(self, path: Path) -> None:
@@ -50,13 +56,28 @@ class DelimitedFile:
         rows = [line for line in first if not line.startswith("#")]
         if not rows:
             raise RecordingError(f"{path} is empty: a line for every sample was expected.")
-        self._delimiter = next((mark for mark in "\t;," if mark in rows[0]), None)
-        cells = self._cells(rows[:1])[0]
-        self.has_header = not any(is_number(self._number_text(cell)) for cell in cells if cell.strip())
-        if not self.has_header:
+        self._above, self._delimiter = next(
+            ((above, mark) for above, row in enumerate(rows) if _has_number(row, mark := _delimiter(row))),
+            (1, _delimiter(rows[0])),
+        )
+        above = self._cells(rows[: self._above])
+        while len(above) > 1 and all(cell.strip().lower() in _MISSING for cell in above[-1]):
+            above.pop()  # a row that holds no number yet
+        self._above = len(above)
+        *titles, header = above or [[]]
+        units: list[str] = []
+        if titles and len(titles[-1]) == len(header) and 2 * sum(map(_is_unit, header)) >= len(header):
+            units, header = [cell.strip(" ()[]") for cell in header], titles.pop()
+        self.title = len(titles)
+        if not self._above:
+            cells = self._cells(rows[:1])[0]
             named = self._cells([first[0].lstrip("# ")])[0] if first[0].startswith("#") else []
-            cells = named if len(named) == len(cells) else [str(i + 1) for i in range(len(cells))]
-        self.columns = [_column(index, cell) for index, cell in enumerate(cells)]
+            header = named if len(named) == len(cells) else [str(i + 1) for i in range(len(cells))]
+        named_units = [name_and_unit(cell) for cell in header]
+        self.columns = [
+            Column(index, name, unit or (units[index] if units else ""))
+            for index, (name, unit) in enumerate(named_units)
+        ]
 
     def column(self, given: str, what: str) -> Column:
         """Returns the column of this name, or with this number from 1; a RecordingError names the nearest."""
@@ -92,7 +113,7 @@ class DelimitedFile:
         wanted = [column.index for column in columns]
         with _open_lines(self.path) as lines:
             numbered = ((n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.startswith("#"))
-            if self.has_header:
+            for _ in range(self._above):
                 next(numbered)
             while chunk := list(itertools.islice(numbered, _BLOCK_ROWS)):
                 rows = self._cells([line for _, line in chunk])
@@ -120,13 +141,31 @@ class DelimitedFile:
             ) from None
 
     def _number_text(self, cell: str) -> str:
-        text = cell.strip()
-        return text.replace(",", ".") if self._delimiter == ";" else text
+        return _number_text(cell, self._delimiter)
 
     def _cells(self, lines: Iterable[str]) -> list[list[str]]:
-        if self._delimiter is None:
-            return [line.split() for line in lines]
-        return list(csv.reader(lines, delimiter=self._delimiter))
+        return _split(lines, self._delimiter)
+
+
+def _delimiter(row: str) -> str | None:
+    return next((mark for mark in "\t;," if mark in row), None)
+
+
+def _split(lines: Iterable[str], delimiter: str | None) -> list[list[str]]:
+    return [line.split() for line in lines] if delimiter is None else list(csv.reader(lines, delimiter=delimiter))
+
+
+def _number_text(cell: str, delimiter: str | None) -> str:
+    text = cell.strip()
+    return text.replace(",", ".") if delimiter == ";" else text
+
+
+def _has_number(row: str, delimiter: str | None) -> bool:
+    return any(is_number(_number_text(cell, delimiter)) for cell in _split([row], delimiter)[0] if cell.strip())
+
+
+def _is_unit(cell: str) -> bool:
+    return is_unit(cell.strip(" ()[]"))
 
 
 @contextlib.contextmanager
@@ -146,7 +185,3 @@ def _open_lines(path: Path) -> Iterator[Iterator[str]]:
             ) from error
         except csv.Error as error:
             raise RecordingError(f"The recording {path} is no table: a cell is longer than any number.") from error
-
-
-def _column(index: int, cell: str) -> Column:
-    return Column(index, *name_and_unit(cell))

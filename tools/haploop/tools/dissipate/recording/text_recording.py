@@ -79,6 +79,8 @@ class TextRecording:
         self._file = file = DelimitedFile(path)
         self._rate_Hz = layout.rate_Hz
         self._columns, self._scales = self._choose(file, layout)
+        if file.title:
+            self.notes.remarks.append(f"Lines above the header, taken for a title: {file.title}.")
         self.has_force = "force" in self._columns
         if not self.has_force and (unread := file.find(_FORCES)):
             self.notes.remarks.append(f"Column {unread.name} was not read: --force {unread.name} books its work.")
