@@ -78,3 +78,31 @@ def test_a_single_cell_or_column_and_cells_without_a_number_are_drawn(
     assert not artists(drawn, "amplitudes")
     verdict = result.get("verdict", "failed").replace("-", " ")
     assert verdict in words(drawn, "description")[0]
+
+
+def test_what_does_not_swing_lies_below_every_number_and_is_called_none() -> None:
+    results = [said("steady", 0.0), said("steady", 1e-16), said("limit-cycle", 1e-3), said("limit-cycle", 2e-3)]
+    drawn = make_figure(table({K: STIFFNESSES}, cells_of({K: STIFFNESSES}), results, [None] * 4))
+    (steady,) = artists(drawn, "cells steady")
+    (none,) = artists(drawn, "none")
+    assert set(steady.get_ydata()) == {none.get_position()[1]}
+    assert none.get_position()[1] < 0.5e-3
+    drawn.draw_without_rendering()
+    labelled = [tick for tick in drawn.axes[0].yaxis.get_major_ticks() if tick.label1.get_text()]
+    assert min(tick.get_loc() for tick in labelled) > none.get_position()[1]
+    swinging = make_figure(table({K: STIFFNESSES}, cells_of({K: STIFFNESSES}), results[2:] * 2, [None] * 4))
+    assert not artists(swinging, "none")
+
+
+@pytest.mark.parametrize("axes", [{K: STIFFNESSES[:2], B: DAMPINGS[:2]}, {K: STIFFNESSES}])
+def test_steady_cells_with_a_proviso_are_hatched_and_counted(axes: dict[str, list[float]]) -> None:
+    """Of the cells the first is plainly steady, the second rests on friction, the others swing."""
+    held = {"provisos": ["only friction holds it"]}
+    results = [said("steady", 1e-7), said("steady", 1e-7) | held, *[said("limit-cycle", 1e-4)] * 2]
+    drawn = make_figure(table(axes, cells_of(axes), results, [WITH_DAMPING] * 4))
+    assert "of these with a proviso: 1" in legend(drawn)
+    if len(axes) == 2:
+        (patch,) = artists(drawn, "hatch with a proviso")
+        assert len(patch.get_path().vertices) == 5  # one rectangle
+        return
+    assert [bool(span.get_hatch()) for span in artists(drawn, "steady")] == [False, True]

@@ -47,6 +47,7 @@ class Cells:
         least_m: the least swing among all seeds.
         agree, seeds: how many seeds came to that verdict, and how many ran.
         row: a row of the table with that verdict; -1 for none.
+        rests_on: whether it is steady, and a run of it rests on something that is told beside.
     """
 
     verdict: np.ndarray
@@ -55,6 +56,7 @@ class Cells:
     agree: np.ndarray
     seeds: np.ndarray
     row: np.ndarray
+    rests_on: np.ndarray
 
     def count(self) -> dict[int, int]:
         """Counts the cells of each verdict that any came to, the mildest first."""
@@ -159,7 +161,11 @@ class MapData:
         first[at_shown] = shown
         np.fmax.at(amplitude, at_shown, swings_m[shown])
         np.fmin.at(least, at, swings_m)
-        return Cells(worst, amplitude, np.where(np.isinf(least), math.nan, least), agree, seeds, first)
+        told = np.array([bool(self.provisos(row)) for row in range(len(verdicts))])
+        rests_on = np.zeros(shape, bool)
+        np.logical_or.at(rests_on, at, told & (verdicts == worst[at]) & (verdicts == Verdict.STEADY))
+        least = np.where(np.isinf(least), math.nan, least)
+        return Cells(worst, amplitude, least, agree, seeds, first, rests_on)
 
     @property
     def is_unpushed(self) -> bool:

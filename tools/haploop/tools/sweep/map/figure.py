@@ -89,7 +89,7 @@ def make_figure(data: MapData) -> Figure:
             axis.dress(ax, which, sheet.is_low(number) if which == "x" else sheet.is_left(number))
         panel_title(ax, panel.titles[0])
         over.drawn = {it.name: draw_line(ax, it, along, styles[it.name]) for it in over.lines if it.pieces}
-    sheet.column.signs(verdict_signs(cells.count(), data.word, as_points=layout.y is None))
+    sheet.column.signs(verdict_signs(cells.count(), data.word, layout.y is None, int(cells.rests_on.sum())))
     if scale:
         sheet.column.amplitudes(scale, data.word(Verdict.LIMIT_CYCLE))
     sheet.column.signs(line_signs(styles, overs))

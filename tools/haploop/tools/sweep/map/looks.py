@@ -38,12 +38,19 @@ LOOKS: dict[int, Look] = {
     Verdict.GROWING: Look("#7A2430", "+++", "#D0A0A8", "v", COLOURS["growing"]),
     Verdict.DIVERGED: Look("#3B0F1E", "///", "#A58090", "^", COLOURS["diverged"]),
 }
+# Of cells that are steady with a proviso.
+PROVISO = Look(LOOKS[Verdict.STEADY].fill, "//", "#A9CDDD", "o", COLOURS["steady"])
 # Of amplitudes that have colours of their own, the least over the greatest.
 _RANGE = 1e-5
 
 
-def verdict_signs(counts: Mapping[int, int], word: Callable[[int], str], as_points: bool) -> list[Artist]:
-    """Makes the sign of every verdict, a point or a cell, labelled with its word and how many cells came to it."""
+def verdict_signs(
+    counts: Mapping[int, int], word: Callable[[int], str], as_points: bool, with_proviso: int = 0
+) -> list[Artist]:
+    """Makes the sign of every verdict, a point or a cell, labelled with its word and how many cells came to it.
+
+    ``with_proviso`` of the steady ones have a sign of their own where cells are shown.
+    """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -55,6 +62,9 @@ def verdict_signs(counts: Mapping[int, int], word: Callable[[int], str], as_poin
         else:
             edge = look.hatch_colour or GREY
             signs.append(Patch(facecolor=look.fill, edgecolor=edge, hatch=look.hatch, linewidth=0.6, label=label))
+        if number == Verdict.STEADY and with_proviso:
+            of = {"facecolor": PROVISO.fill, "edgecolor": PROVISO.hatch_colour, "hatch": 2 * PROVISO.hatch}
+            signs.append(Patch(**of, linewidth=0.6, label=f"of these with a proviso: {with_proviso}"))
     return signs
 
 
@@ -77,11 +87,11 @@ def amplitude_scale(amplitudes_m: np.ndarray) -> LogNorm | None:
     return LogNorm(low, high) if high > 2.0 * low else LogNorm(low / 1.5, high * 1.5)
 
 
-def metres_along(axis: MatplotlibAxis, ratio: float) -> None:
-    """Puts numbers with their own unit along a logarithmic axis of metres that reaches over a ratio."""
+def metres_along(axis: MatplotlibAxis, ratio: float, from_m: float = 0.0) -> None:
+    """Puts numbers with their own unit along a logarithmic axis of metres that reaches over a ratio, from one on."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     few = {60.0: (1,), 12.0: (1, 3), 3.0: (1, 2, 5), 0.0: (1, 2, 3, 4, 6, 8)}
     axis.set_major_locator(LogLocator(subs=next(subs for least, subs in few.items() if ratio > least), numticks=7))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: amount(value, "m", digits=1)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: amount(value, "m", digits=1) if value >= from_m else ""))
     axis.set_minor_formatter(NullFormatter())

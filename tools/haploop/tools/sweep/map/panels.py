@@ -10,7 +10,7 @@ import numpy as np
 from haploop.tools.figure.style import FAINT, GREY, INK, SMALL, TEXT
 from haploop.tools.sweep.map.axis import Axis
 from haploop.tools.sweep.map.data import NOT_RUN, VERDICTS, Cells, Verdict
-from haploop.tools.sweep.map.looks import LOOKS, Look, amplitude_colours, metres_along
+from haploop.tools.sweep.map.looks import LOOKS, PROVISO, Look, amplitude_colours, metres_along
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,6 +38,8 @@ def draw_cells(ax: Axes, x: Axis, y: Axis, cells: Cells, scale: LogNorm | None) 
     for number, look in LOOKS.items():
         if look.hatch and (verdict == number).any():
             _hatch(ax, edges, verdict == number, look, f"hatch {VERDICTS[number]}")
+    if cells.rests_on.any():
+        _hatch(ax, edges, cells.rests_on.T, PROVISO, "hatch with a proviso")
     _outline(ax, edges, verdict)
 
 
@@ -114,22 +116,28 @@ _BELOW, _ABOVE = 3.0, 6.0
 
 
 class SwingScale:
-    """One logarithmic scale of swings for all panels, with a shelf above for cells that have no number."""
+    """One logarithmic scale of swings for all panels, with a shelf above for cells that have no number.
+
+    Attributes:
+        least: the least swing that has a number along the scale.
+        floor: where those lie that swing less, or not at all, below ``least``; None where there are none.
+    """
 
     def __init__(self, cells: Cells) -> None:
         known = np.concatenate([cells.amplitude_m.ravel(), cells.least_m.ravel()])
-        known = known[np.isfinite(known) & (known > 0.0)]
-        self.any = bool(len(known))
-        least, most = (float(known.min()), float(known.max())) if self.any else (1e-6, 1e-3)
+        known = known[np.isfinite(known)]
+        swinging = known[known > 0.0]
+        self.any = bool(len(swinging))
+        least, most = (float(swinging.min()), float(swinging.max())) if self.any else (1e-6, 1e-3)
         # Below a picometre there is nothing to see.
-        least = max(least, 1e-12, 1e-8 * most)
-        self.floor = least
-        self.low, self.high = least / _BELOW, max(most, least) * _ABOVE
+        self.least = max(least, 1e-12, 1e-8 * most)
+        self.floor = self.least / _BELOW if (known < self.least).any() else None
+        self.low, self.high = (self.floor or self.least) / _BELOW, max(most, self.least) * _ABOVE
         self.shelf = self.high / np.sqrt(_ABOVE)
 
     def place(self, amplitudes_m: np.ndarray) -> np.ndarray:
         """Returns coordinates of amplitudes: none at all on the floor, unknown and boundless ones on the shelf."""
-        at = np.maximum(amplitudes_m, self.floor)
+        at = np.where(amplitudes_m < self.least, self.floor or self.least, amplitudes_m)
         return np.where(np.isfinite(at), at, self.shelf)
 
 
@@ -138,7 +146,9 @@ def draw_swings(ax: Axes, x: Axis, cells: Cells, scale: SwingScale, label: bool)
     ran = cells.verdict != NOT_RUN
     at, places, edges = x.coordinates, scale.place(cells.amplitude_m), x.edges
     for i in np.flatnonzero(cells.verdict == Verdict.STEADY):
-        ax.axvspan(edges[i], edges[i + 1], color=LOOKS[Verdict.STEADY].fill, linewidth=0, zorder=0.2, gid="steady")
+        style = {"facecolor": LOOKS[Verdict.STEADY].fill, "edgecolor": PROVISO.hatch_colour, "linewidth": 0}
+        hatch = PROVISO.hatch if cells.rests_on[i] else ""
+        ax.axvspan(edges[i], edges[i + 1], **style, hatch=hatch, zorder=0.2, gid="steady")
     known = ran & np.isfinite(cells.amplitude_m)
     ax.plot(at, np.where(known, places, np.nan), color=FAINT, linewidth=1.2, zorder=2, gid="line")
     for i in np.flatnonzero(known & (cells.seeds > 1)):
@@ -154,11 +164,14 @@ def draw_swings(ax: Axes, x: Axis, cells: Cells, scale: SwingScale, label: bool)
             )  # fmt: skip
     ax.set_yscale("log")
     ax.set_ylim(scale.low, scale.high)
-    metres_along(ax.yaxis, scale.high / scale.low)
+    metres_along(ax.yaxis, scale.high / scale.low, np.sqrt(scale.least * (scale.floor or scale.least)))
     ax.tick_params(axis="y", labelsize=SMALL, colors=GREY, labelcolor=INK)
     ax.tick_params(axis="y", which="both", labelleft=label)
     if label:
         ax.set_ylabel("swing, peak to peak", fontsize=TEXT, color=INK)
+        if scale.floor:
+            style = {"ha": "right", "va": "center", "fontsize": SMALL, "color": INK, "gid": "none"}
+            ax.text(-0.012, scale.floor, "none", transform=ax.get_yaxis_transform(), **style)
     ax.grid(axis="y", color="#E6E6E6", linewidth=0.6, zorder=0.5)
 
 
