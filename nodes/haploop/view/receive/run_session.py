@@ -83,6 +83,8 @@ class RunSession:
             now = at_work(self.scene, changes_of(self.events))
             self.history.at_work = AtWork(now.dissipation, now.wall)
         now = wall_clock.monotonic()
+        if self.clock.status.get("paused"):  # nor does the rate after it count the standstill
+            self._seen.clear()
         if self.history.first_tick is not None:
             self._seen.append((now, self.history.end_tick))
         while self._seen and now - self._seen[0][0] > _FACTOR_S:
