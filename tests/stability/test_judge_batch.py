@@ -40,6 +40,11 @@ def rubbing() -> list[Scene]:
     return shipped("fig6a", [60.0, 400.0, 4000.0], friction=Friction(kinetic=0.02))
 
 
+def friction_or_none() -> list[Scene]:
+    scenes = shipped("fig6b", [150.0, 150.0, 2000.0], friction=Friction(kinetic=0.0))
+    return [with_value(scenes[0], "friction.kinetic", 0.02), *scenes[1:]]
+
+
 def devices() -> list[Scene]:
     """Premium 1.5s of other masses, of which friction alone holds some."""
     scenes = [replace(load("demo", ["event=[]"]), duration=1.0)] * 3
@@ -68,6 +73,7 @@ FAMILIES: dict[str, Callable[[], list[Scene]]] = {
     "swaying": swaying,
     "counts": within_counts,
     "devices that rub": devices,
+    "friction or none": friction_or_none,
     "observing": lambda: [observed(k, run={"verdict": "pushed"}) for k in (300.0, 2000.0)],
 }
 
@@ -90,7 +96,7 @@ def test_a_loop_judged_among_others_has_the_words_and_bits_it_has_alone(family):
     assert any(result["stability"].get("at_hardest") for result in alone) == (family == "swaying")
     assert any(result["stability"].get("deeper") == "swings on" for result in alone) == (family == "counts")
     assert any(result["stability"].get("frictionless") for result in alone) == (
-        family in ("friction", "devices that rub")
+        family in ("friction", "friction or none", "devices that rub")
     )
 
 

@@ -45,6 +45,12 @@ def test_without_friction_it_is_not_steady_and_held_a_part_of_a_count_deeper_it_
 
 
 @pytest.mark.slow
+def test_friction_of_0_is_none() -> None:
+    told = judge(ended(premium(583.0, "friction.kinetic=0")), LOOKS_S, thorough=True)
+    assert (told.word, told.frictionless, told.deeper) == ("undecided", None, "swings on")
+
+
+@pytest.mark.slow
 def test_what_rests_at_all_places_within_a_count_is_steady_and_says_so() -> None:
     told = judge(ended(replace(premium(320.0), friction=None)), LOOKS_S, thorough=True)
     assert (told.word, told.deeper) == ("steady", "rests")
@@ -52,7 +58,9 @@ def test_what_rests_at_all_places_within_a_count_is_steady_and_says_so() -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("stiffness", "does"), [(200.0, "rests"), (583.0, "swings on deeper"), (850.0, "swings on")])
+@pytest.mark.parametrize(
+    ("stiffness", "does"), [(200.0, "rests"), (583.0, "swings on a part of a count deeper"), (850.0, "swings on")]
+)
 def test_where_friction_alone_holds_it_at_any_place_within_a_count_that_is_said_beside_steady(
     stiffness: float, does: str
 ) -> None:

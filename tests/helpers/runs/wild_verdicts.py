@@ -52,7 +52,7 @@ def judged(seeds: Iterable[int], count: int, each: Callable[..., Iterable[Any]] 
 
 
 def _found(scene: Scene) -> Finding:
-    return judge_scene(scene, registry(), None, LOOKS_S)
+    return judge_scene(scene, registry(), None, LOOKS_S, thorough=True)
 
 
 def main() -> None:

@@ -84,8 +84,7 @@ class Finding:
         blow_N: of a loop that rests after the push, a harder one, into the wall and off it; None if not asked.
         blown: what it does after these: rests, rests off the wall, swings on, or undecided; None if not asked.
         frictionless: what a loop that rests, too, after these would do after the push without its friction: rests,
-            swings on, swings on deeper, by a part of an encoder's count, or undecided; None if not asked, and of a loop
-            without.
+            swings on, swings on a part of a count deeper, or undecided; None if not asked, and of a loop without.
         deeper_N: of a loop without friction that rests, by how much harder the hand holds it where it lies a part of an
             encoder's count deeper; None if not asked, and without counts.
         deeper: what it does there: rests, swings on, or undecided; None if not asked.
@@ -152,7 +151,7 @@ class Finding:
         """
         does = _DOES.get(found.word, "undecided")
         if self.frictionless:
-            return replace(self, frictionless=f"{does} deeper" if does == "swings on" else does)
+            return replace(self, frictionless=f"{does} a part of a count deeper" if does == "swings on" else does)
         drift = self.memory_drifts or found.memory_drifts
         told = replace(self, deeper_N=abs(more_N), deeper=does, memory_drifts=drift)
         return told if does == "rests" else replace(told, word="undecided", why="rested")
@@ -185,7 +184,7 @@ class Finding:
         if self.word == "limit-cycle":
             return [UNFELT] * (not self.felt) + [OTHER_WIDTH] * (not beside and self._is_other(seen_m))
         holds = {
-            "only friction holds it": self.frictionless in ("swings on", "swings on deeper"),
+            "only friction holds it": self.frictionless in ("swings on", "swings on a part of a count deeper"),
             "perhaps only friction holds it": self.frictionless == "undecided",
             "an element's memory still changes": self.memory_drifts,
             "at some holds of its hand": HAND_MOVES in beside,

@@ -20,6 +20,7 @@ from haploop.launch.stability.looks import (
     SMALLER,
     failed,
     findings,
+    has_friction,
     is_struck,
     left_limit,
     moved_beside,
@@ -185,8 +186,8 @@ def judge(
 def _elsewhere(end: End, pushes_N: tuple[float, ...], found: Finding) -> Finding:
     """Returns the finding of a loop that rests with what it does without its friction, and elsewhere within a count."""
     if end.scene.friction:
-        end = replace(end, scene=replace(end.scene, friction=Friction(kinetic=0.0)))
-        found = found.without_friction(_watched(end, pushes_N, LOOKS_S)[0])
+        rubs, end = has_friction(end.scene), replace(end, scene=replace(end.scene, friction=Friction(kinetic=0.0)))
+        found = found.without_friction(_watched(end, pushes_N, LOOKS_S)[0]) if rubs else found
     for hold_N in deeper_holds(end.scene, end.controller.params.wall, end.hold_N):
         if found.rests_freely:
             push_N = push_of(hold_N, end.scene.hand, end.wall_m)

@@ -16,6 +16,7 @@ from haploop.launch.stability.looks import (
     SMALLER,
     failed,
     findings,
+    has_friction,
     is_struck,
     left_limit,
     parts,
@@ -83,8 +84,9 @@ def _elsewhere(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, found: li
     """Returns the findings; of each loop that rests, with what it does without its friction, and within a count."""
     found, rests = list(found), [place for place, each in enumerate(found) if is_struck(each)]
     if rests and end.scenes[0].friction:
+        held = {place: float(hold_N[place]) for place in rests if has_friction(end.scenes[members[place]])}
         end = end._replace(scenes=[replace(scene, friction=Friction(kinetic=0.0)) for scene in end.scenes])
-        for place, free in _pushed(end, members, dict(zip(rests, hold_N[rests].tolist(), strict=True))).items():
+        for place, free in _pushed(end, members, held).items():
             found[place] = found[place].without_friction(free)
     deeper = {place: _deeper(end, members[place], float(hold_N[place])) for place in rests}
     for nth in range(max(map(len, deeper.values()), default=0)):

@@ -51,7 +51,7 @@ DEEPER = {
 FRICTIONLESS = {
     "rests": " Held so it would without its friction, too.",
     "swings on": " Only friction holds it: without, its swing would last or grow.",
-    "swings on deeper": " Only friction holds it: without, its swing would last or grow a part of an encoder's count "
-    "deeper.",
+    "swings on a part of a count deeper": " Only friction holds it: without, its swing would last or grow a part of an "
+    "encoder's count deeper.",
     "undecided": " Whether it would without its friction could not be told.",
 }
