@@ -68,6 +68,31 @@ def test_what_a_device_file_assumes_is_known_and_what_a_file_built_on_it_measure
     assert "friction.kinetic" not in of_cable
 
 
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("mass = 0.3  # kg. ASSUMPTION: weighed with its arm", "weighed with its arm"),
+        ("mass = 0.3  # kg, assumption: a guess", "a guess"),
+        ("mass = 0.3  # kg. Assumed, never measured", "never measured"),
+        ("# ASSUMPTION: a guess,\n# since its drawing is lost\nmass = 0.3  # kg", "a guess, since its drawing is lost"),
+        ("# ASSUMPTION: a guess\nmass = 0.3", "a guess"),
+        ("mass = 0.3  # ASSUMPTION", "ASSUMPTION"),
+    ],
+)
+def test_a_number_is_assumed_that_its_comment_or_the_lines_above_say_is(tmp_path, line, words):
+    mine = tmp_path / "mine.toml"
+    mine.write_text(f"# all of this is an assumption\n\n[device]\n{line}\ndamping = 0.1  # N s/m, measured\n")
+    assert [(of.key, of.words) for of in assumptions(mine)] == [("device.mass", words)]
+
+
+@pytest.mark.parametrize("comment", ["", "  # weighed", "  # as measured, without assumptions"])
+def test_a_number_of_ones_own_in_place_of_an_assumed_one_is_not_assumed(tmp_path, comment):
+    mine = tmp_path / "mine.toml"
+    mine.write_text(f'extends = "devices/omega3.toml"\n[device]\nmass = 0.3{comment}\n')
+    is_said = "assumptions" in comment
+    assert ("device.mass" in {of.key for of in assumptions(mine)}) == is_said
+
+
 def test_a_device_of_ones_own_is_taken_as_the_presets_are_and_a_scene_with_a_wall_as_a_task(tmp_path):
     mine = tmp_path / "mine.toml"
     mine.write_text('extends = "omega3.toml"\n[device]\nmass = 0.3  # weighed\n')

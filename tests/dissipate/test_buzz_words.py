@@ -46,6 +46,14 @@ def test_a_slower_swing_is_told_beside_a_buzz_though_the_buzz_comes_first(tmp_pa
     assert "also swings" not in shown(make_report(alone), 600)
 
 
+@pytest.mark.parametrize("frequency_Hz", [15.2, 15.5, 16.0])
+def test_a_buzz_at_the_border_of_both_bands_is_told_once(tmp_path: Path, frequency_Hz: float) -> None:
+    found = outcome(write(tmp_path / "border.csv", {"t": S, "x": swing(frequency_Hz, 5e-4)}))
+    said = shown(make_report(found), 600)
+    assert said.startswith("The recording buzzes")
+    assert "also swings" not in said
+
+
 def test_where_gaps_leave_only_short_parts_that_swing_that_no_buzz_was_seen_is_not_all_that_is_said(
     tmp_path: Path,
 ) -> None:

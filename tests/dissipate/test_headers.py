@@ -8,6 +8,7 @@ import pytest
 
 from haploop.tools.dissipate.recording.delimited import DelimitedFile
 from haploop.tools.dissipate.recording.samples import RecordingError
+from haploop.tools.dissipate.recording.text_recording import Layout
 from helpers.data.recordings import T, X, outcome, true_J
 
 ROWS = [f"{1e3 * t!r},{1e3 * x!r}" for t, x in zip(T.tolist(), X.tolist(), strict=True)]
@@ -62,3 +63,37 @@ def test_a_first_row_without_a_number_is_no_header(tmp_path: Path, cell: str) ->
 
 def test_names_that_are_letters_of_units_stay_names_where_nothing_stands_above(tmp_path: Path) -> None:
     assert [column.name for column in DelimitedFile(recorded(tmp_path, "s,m")).columns] == ["s", "m"]
+
+
+@pytest.mark.parametrize("header", [("t (ms),x (mm)",), ()])
+def test_a_row_of_more_cells_than_columns_is_refused_since_decimal_commas_would_be_read_as_columns(
+    tmp_path: Path, header: tuple[str, ...]
+) -> None:
+    """With decimal commas between commas a buzz of half a millimetre was read as whole numbers that rest."""
+    first = [*header, "0,0"]
+    path = recorded(tmp_path, *first, "1,0,0120")
+    with pytest.raises(RecordingError, match=rf"Line {len(first) + 1} .* has 3 cells, but 2 .* Decimal commas need"):
+        outcome(path, layout=Layout("2", "1", time_unit="ms"), dampings=["1.0"])
+
+
+def test_empty_cells_at_the_end_of_a_row_are_none(plain: Path, tmp_path: Path) -> None:
+    path = recorded(tmp_path, "t (ms),x (mm)", rows=[f"{row},," for row in ROWS])
+    assert true_J(path) == pytest.approx(true_J(plain), rel=1e-9)
+
+
+@pytest.mark.parametrize("header", ["t (ms),position (mm),position (deg)", "t (ms),x (mm),position (mm)"])
+def test_of_two_columns_that_may_be_the_position_it_asks_which(tmp_path: Path, header: str) -> None:
+    path = recorded(tmp_path, header, rows=[f"{row},0" for row in ROWS])
+    with pytest.raises(RecordingError, match=r"Which column of .* is the position, .* \(2\), .* \(3\)\?"):
+        outcome(path, dampings=["1.0"])
+    assert outcome(path, layout=Layout("2"), dampings=["1.0"]).recording.notes.rows == len(ROWS)
+
+
+@pytest.mark.parametrize(("code", "named"), [("utf-16", "UTF-16"), ("cp1252", "CP1252")])
+def test_the_command_that_turns_other_text_into_utf_8_names_the_code_it_is_in(
+    tmp_path: Path, code: str, named: str
+) -> None:
+    path = tmp_path / "my run.csv"
+    path.write_bytes("Zeit,Länge\n0,0\n".encode(code))
+    with pytest.raises(RecordingError, match=f"iconv -f {named} -t UTF-8 'my run.csv'"):
+        DelimitedFile(path)

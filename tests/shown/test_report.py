@@ -96,6 +96,18 @@ def test_the_likely_cause_is_told_of_what_swings_alone(swap: dict[str, Any], ver
     assert (f"Likely cause: {cause(swap['energy'])}" in text) == is_told
 
 
+@pytest.mark.parametrize(
+    ("counts", "is_told"), [(None, False), (0.43, True), (1.9, True), (2.1, False), (300.0, False)]
+)
+def test_a_swing_within_two_counts_of_the_encoder_is_said_to_come_of_them_before_its_energy(
+    swap: dict[str, Any], counts: float | None, is_told: bool
+) -> None:
+    stability = swap["stability"] | {"counts": counts}
+    text = " ".join(shown(summary_table({**swap, "verdict": "limit-cycle", "stability": stability})).split())
+    assert ("Likely cause: the encoder: it swings by" in text) == is_told
+    assert cause(swap["energy"]) in text
+
+
 def energy(*elements: tuple[str, float], **leak: float) -> dict[str, Any]:
     causes = dict.fromkeys(("delay_J", "sampling_and_hold_J", "quantisation_J"), 0.0) | leak
     booked = [{"kind": kind, "true_J": true_J} for kind, true_J in elements]

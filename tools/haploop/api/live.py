@@ -198,8 +198,8 @@ class LiveLoop:
         self._ask("undo")
 
     def pause(self) -> int:
-        """Stands still at the next tick that can; returns it."""
-        return self._ask("pause")["tick"]
+        """Stands still at the next tick that can; returns it once all before it are done."""
+        return self._when_done(self._ask("pause")["tick"])
 
     def resume(self) -> int:
         """Goes on; returns the tick."""
@@ -211,7 +211,9 @@ class LiveLoop:
 
     def step(self, ticks: int = 1) -> int:
         """Goes on for some control ticks and stands still; returns the tick once all of them are done."""
-        tick = self._ask("step", ticks=ticks)["tick"]
+        return self._when_done(self._ask("step", ticks=ticks)["tick"])
+
+    def _when_done(self, tick: int) -> int:
         while self.status()["tick"] < tick:
             time.sleep(_LOOK_S)
         return tick
@@ -224,7 +226,8 @@ class LiveLoop:
         """Yields what the controller saw and did since the last time, until the run is over.
 
         Each is arrays of shape (ticks,) by column: ``t`` in s, ``x`` in m, ``v`` in m/s, ``wall``, ``total`` and
-        ``dissipation.0`` in N, and so on. Whoever is too slow misses ticks and never holds the run up.
+        ``dissipation.0`` in N, and so on. Whoever is too slow misses ticks and never holds the run up. Nothing comes
+        while the run stands still: resume it before, or from another thread.
         """
         from haploop.tools.attach.observed_run import ObservedRun
 

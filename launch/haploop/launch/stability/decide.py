@@ -91,6 +91,7 @@ class Finding:
         hardest_N: of a loop that rests then, too, the hardest hold that its hand came to; None if that was about the
             last one, or the hand stays.
         at_hardest: what it does there: rests, swings on, or undecided; None if not asked.
+        counts: of a swing behind an encoder, its width in counts; None of any other.
         settles_s: how long after the push it came within 5 % of where it rests; None of one that does not.
         memory_drifts: whether what an element remembers still goes on changing where the loop rests.
     """
@@ -116,6 +117,7 @@ class Finding:
     at_hardest: str | None = None
     deeper_N: float | None = None
     deeper: str | None = None
+    counts: float | None = None
     settles_s: float | None = None
     memory_drifts: bool = False
     detail: str = ""
@@ -297,5 +299,6 @@ def _finding(swing: Swing, word: str, why: str) -> Finding:
     return Finding(
         word, why, swing.push_N, swing.watched_s, swing.rate_1_s, swing.error_1_s, frequency_Hz, swing.told_m,
         swing.spread_m, ripple_N, swing.times_felt >= 1.0 or swing.width_m >= felt_m, None, needs_s, most_1_s,
+        counts=swing.told_m / swing.count_m if swing.count_m and word in ("limit-cycle", "growing") else None,
         settles_s=swing.settles_s if why in ("rest", "unfelt") else None,
     )  # fmt: skip

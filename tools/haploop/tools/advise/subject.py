@@ -53,9 +53,9 @@ _STUCK = (
 )
 
 # How a device file says which of its numbers are assumed.
-_MARK = "ASSUMPTION"
+_MARK = re.compile(r"\bassum(?:ption|ptions|ed)\b[:,]?\s*", re.IGNORECASE)
 _TABLE = re.compile(r"\[+\s*([\w.]+)\s*\]+")
-_VALUE = re.compile(r"([\w]+)\s*=\s*[^#]*#\s*(.*)")
+_VALUE = re.compile(r"([\w]+)\s*=\s*[^#]*(?:#\s*(.*))?$")
 # What decides how stiff a wall may be; the hand is tried in its own corners.
 _DELAY = "clock.round_trip_delay"
 _STARTS = ("device.position", "device.velocity")
@@ -153,16 +153,17 @@ def _by_key(path: Path) -> dict[str, Assumed]:
     known: dict[str, Assumed] = {}
     for name in [extends] if isinstance(extends, str) else extends:
         known |= _by_key(found(Path(name), "scenes", path.parent))
-    table = ""
+    table, above = "", ""
     for line in text.splitlines():
+        above, told_above = (f"{above} {line.lstrip('# ')}" if line.startswith("#") else ""), above
         if match := _TABLE.match(line):
             table = match[1]
         elif (match := _VALUE.match(line)) and table.split(".")[0] in _TABLES:
-            key, comment = f"{table}.{match[1]}", match[2]
+            key, comment = f"{table}.{match[1]}", match[2] or ""
             if key in _STARTS:
                 continue
-            words = comment.partition(f"{_MARK}: ")[2] if _MARK in comment else ""
-            known[key] = Assumed(key, words)
+            told = next((of for of in (comment, told_above) if _MARK.search(of)), "")
+            known[key] = Assumed(key, _MARK.split(told, maxsplit=1)[1].strip() or told.strip() if told else "")
     return known
 
 

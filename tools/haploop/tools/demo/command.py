@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -53,5 +54,5 @@ def demo(
             figure = draw(story, directory / FIGURE)
         except FigureError as error:
             leave(f"No figure: {error}\nThe run is in {directory}.", FAILED)
-    print(_NEXT.format(scene=SCENE, directory=directory), file=sys.stderr)
+    print(_NEXT.format(scene=SCENE, directory=shlex.quote(str(directory))), file=sys.stderr)
     print(figure)

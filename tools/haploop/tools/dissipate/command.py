@@ -30,6 +30,9 @@ from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.terminal import console
 
+_OWN_COLUMNS = (
+    "A log has its own columns, times, units and force: leave out the options that name them, which are for text files."
+)
 _LONGEST_DELAY_S = 60.0
 Kinds = Mapping[str, "type[Element]"]
 # Tables that can be overridden; [encoder] tells the estimators to what the positions were rounded.
@@ -164,7 +167,7 @@ def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording,
     path, selection = request.path, request.selection
     if path.is_dir() or path.suffix == ".mcap":
         if request.layout != Layout():
-            raise RecordingError("A log has its own columns, times and units; columns are named for text files alone.")
+            raise RecordingError(_OWN_COLUMNS)
 
         scene = read_scene(path)
         recording = LogRecording(path, scene, request.delay_s, selection.estimated_anew())

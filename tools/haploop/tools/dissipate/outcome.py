@@ -29,6 +29,8 @@ Recording = LogRecording | TextRecording
 EQUAL_N = 0.1
 # The terms of a sum that cancel leave so much of them.
 _ROUNDING = 1e-12
+# Lines closer than this are the same.
+_SAME_HZ = 1.0
 
 
 @dataclass(frozen=True)
@@ -239,11 +241,17 @@ def make_outcome(
         found.slow,
         None if buzz or several else found.overtone(),
         several,
-        None if several or not found.slower else found.slower.buzz(),
+        None if several or not found.slower else _apart(found.slower.buzz(), buzz),
         found.fast_rms_m(),
         found.short_s,
         None if buzz or several else found.hidden.found,
     )
+
+
+def _apart(slower: Buzz | None, buzz: Buzz | None) -> Buzz | None:
+    """Returns the slower swing; None where it is the buzz, at the border that both bands share."""
+    is_same = slower and buzz and abs(slower.frequency_Hz - buzz.frequency_Hz) < _SAME_HZ
+    return None if is_same else slower
 
 
 def make_tried(booking: Booking, scene: Scene, kinds: Mapping[str, type[Element]]) -> list[ElementOutcome]:

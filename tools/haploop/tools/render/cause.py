@@ -22,10 +22,25 @@ _NOTHING = "{when} the wall moved no energy at all: what moves here is not fed b
 _WALL = (
     "{when} the wall gave the device {energy} more than an ideal one would have, {share:.0f} % of it because {because}."
 )
+# A loop without counts has no swing of a width of its own so small: it dies, or grows.
+_MOST_COUNTS = 2.0
+_COUNTS = (
+    "the encoder: it swings by {counts:.2g} of its counts. Within two a swing is set off by them, whatever feeds it. "
+)
 # The books of wall and elements are those of the commands, and the actuator has one of its own.
 _LIMITED = " That is by what was commanded: the actuator's limits kept {kept} of it back."
 _KEPT = 0.1
 _ELEMENT = "{when} {element} gave the device {energy}, more than the wall did."
+
+
+def likely_cause(summary: Summary) -> str:
+    """Returns what a swing comes of, given the summary of its run: the encoder where it is within two of its counts.
+
+    Beside that, or alone, stands where its energy is from; "" of books without a wall.
+    """
+    counts = summary.get("stability", {}).get("counts")
+    of_counts = _COUNTS.format(counts=counts) if counts and counts < _MOST_COUNTS else ""
+    return of_counts + cause(summary["energy"])
 
 
 def cause(energy: Summary, when: str = "In all") -> str:

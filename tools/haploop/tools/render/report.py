@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from haploop.launch.foreign import described
 from haploop.launch.scene.mistakes import counted
-from haploop.tools.render.cause import SWINGS, cause
+from haploop.tools.render.cause import SWINGS, likely_cause
 from haploop.tools.render.terminal import console, make_facts, make_table, told, verdict_style
 from haploop.tools.render.units import amount, fixed, parameters, spring
 
@@ -85,7 +85,7 @@ def summary_table(summary: Summary, notes: Sequence[Note] = ()) -> RenderableTyp
     rule = summary["verdict_rule"] if "stability" in summary else summary["verdict_rule"].partition("; ")[0]
     rule = rule.rstrip(".")
     parts: list[RenderableType] = [head, Text(f"{rule[:1].upper()}{rule[1:]}.", style="dim")]
-    if summary["verdict"] in SWINGS and (why := cause(summary["energy"])):
+    if summary["verdict"] in SWINGS and (why := likely_cause(summary)):
         parts.append(Text(f"Likely cause: {why}"))
     if summary["verdict"] == "no-contact":
         parts += [Text(note) for note in notes if note.keeps_off]

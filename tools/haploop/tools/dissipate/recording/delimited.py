@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import itertools
+import shlex
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,8 @@ from haploop.protocol.names import nearest
 from haploop.tools.dissipate.recording.samples import Floats, RecordingError
 
 _BLOCK_ROWS = 16_384
+# How a text of that code begins.
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 # What a cell without a value may hold.
 _MISSING = ("", "-", "--", "na", "n/a", "none", "null")
 
@@ -99,8 +102,11 @@ class DelimitedFile:
 
     def find(self, names: Sequence[str]) -> Column | None:
         """Returns the first column that has one of these names in any case; None for none."""
-        known = {column.name.lower(): column for column in reversed(self.columns)}
-        return next((known[name] for name in names if name in known), None)
+        return next(iter(self.all_of(names)), None)
+
+    def all_of(self, names: Sequence[str]) -> list[Column]:
+        """Returns the columns that have one of these names in any case, in the order of the names."""
+        return [column for name in names for column in self.columns if column.name.lower() == name]
 
     def blocks(self, columns: Sequence[Column]) -> Iterator[tuple[Floats, Floats]]:
         """Yields numbers of these columns, shape (rows, columns), and the line of each row, shape (rows,).
@@ -120,6 +126,7 @@ class DelimitedFile:
                 if len(rows) != len(chunk):
                     line = next((n for n, line in chunk if line.count('"') % 2), chunk[0][0])
                     raise RecordingError(f"Line {line} of {self.path}: a quotation mark is not closed.")
+                self._refuse_more_cells(rows, chunk)
                 try:
                     table = np.array([[float(row[index]) for index in wanted] for row in rows])
                 except (ValueError, IndexError):  # some cell is empty, missing, in other digits or no number
@@ -127,6 +134,16 @@ class DelimitedFile:
                     table = np.array([[self._number(row, index, n) for index in wanted] for row, n in cells])
                 table[~np.isfinite(table)] = np.nan
                 yield table, np.array([float(n) for n, _ in chunk])
+
+    def _refuse_more_cells(self, rows: Sequence[Sequence[str]], chunk: Sequence[tuple[int, str]]) -> None:
+        """Refuses a row with more cells than there are columns: what follows would be read from another's."""
+        for row, (line, _) in zip(rows, chunk, strict=True):
+            if len(row) > len(self.columns) and any(cell.strip() for cell in row[len(self.columns) :]):
+                commas = " Decimal commas need semicolons, tabs or blanks between the cells." * (self._delimiter == ",")
+                raise RecordingError(
+                    f"Line {line} of {self.path} has {len(row)} cells, but {len(self.columns)} columns were expected."
+                    f"{commas}"
+                )
 
     def _number(self, cells: Sequence[str], index: int, line: int) -> float:
         text = self._number_text(cells[index]) if index < len(cells) else ""
@@ -179,9 +196,10 @@ def _open_lines(path: Path) -> Iterator[Iterator[str]]:
         try:
             yield iter(file)
         except UnicodeDecodeError as error:
+            code = "UTF-16" if path.read_bytes()[:2] in _UTF_16 else "CP1252"
             raise RecordingError(
                 f"The recording {path} must be UTF-8 text, which it is not; save it as such, or turn it into it: iconv "
-                f"-f CP1252 -t UTF-8 {path.name} > other.csv."
+                f"-f {code} -t UTF-8 {shlex.quote(path.name)} > other.csv."
             ) from error
         except csv.Error as error:
             raise RecordingError(f"The recording {path} is no table: a cell is longer than any number.") from error

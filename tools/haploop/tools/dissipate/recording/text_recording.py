@@ -129,8 +129,14 @@ class TextRecording:
 
     @staticmethod
     def _guessed(file: DelimitedFile, names: tuple[str, ...], what: str) -> Column:
-        if found := file.find(names):
-            return found
+        found = file.all_of(names)
+        if what == "position" and len(found) > 1:
+            numbers = ", ".join(f"{column.name} ({column.index + 1})" for column in found)
+            raise RecordingError(
+                f"Which column of {file.path} is the position, {numbers}? Give its number with --position."
+            )
+        if found:
+            return found[0]
         there = ", ".join(column.name for column in file.columns)
         instead = " or --rate" if what == "time" else ""
         raise RecordingError(
