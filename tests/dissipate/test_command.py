@@ -124,7 +124,7 @@ def test_a_log_has_columns_of_its_own(tmp_path: Path) -> None:
     made = scene(duration=0.2)
     (tmp_path / "run").mkdir()
     run_in_process(made, KINDS, out=tmp_path / "run", attachments={"scene.toml": to_toml(made.as_dict())})
-    refused(dissipate(tmp_path / "run", "--damping", "1", "--position", "x"), "for text files alone")
+    refused(dissipate(tmp_path / "run", "--damping", "1", "--position", "x"), "which are for text files")
 
 
 def test_an_export_of_a_run_is_a_recording(tmp_path: Path) -> None:
