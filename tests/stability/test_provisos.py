@@ -201,3 +201,16 @@ def test_a_run_that_ends_on_the_way_to_its_swing_is_told_to_have_another_and_one
     for scene_of, said in ((short, ["of another width than in its run"]), (replace(short, duration=2.0), [])):
         summary = run_in_process(scene_of, registry())
         assert (summary["verdict"], summary["stability"]["provisos"]) == ("limit-cycle", said)
+
+
+@pytest.mark.parametrize(("word", "felt"), [("steady", False), ("limit-cycle", False), ("limit-cycle", True)])
+@pytest.mark.parametrize(
+    ("times_felt", "is_edge"), [(None, False), (0.5, False), (0.9, True), (1.1, True), (3.0, False)]
+)
+def test_a_swing_at_the_edge_of_what_a_hand_feels_says_so_whatever_its_word(
+    word: str, felt: bool, times_felt: float | None, is_edge: bool
+) -> None:
+    finding = Finding(word, "unfelt", 0.1, width_m=1e-5, felt=felt, times_felt=times_felt)
+    told = finding.entries()["stability"]["provisos"]
+    assert ("at the edge of what a hand feels" in told) == is_edge
+    assert ("less than a hand feels" in told) == (word == "limit-cycle" and not felt and not is_edge)

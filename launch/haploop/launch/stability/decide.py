@@ -40,6 +40,8 @@ _STILL_N = 1e-9
 _RIPPLES, _RIPPLES_N, _SHAKEN_M = 0.33, 0.1, 10e-6
 HAND_MOVES, NOISE = "the hand's motion", "noise"
 UNFELT, OTHER_WIDTH = "less than a hand feels", "of another width than in its run"
+# Thresholds of touch are known to a quarter, from person to person less well.
+EDGE, _EDGE = "at the edge of what a hand feels", (0.8, 1.25)
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
 _COUNTS = 10
 
@@ -76,6 +78,7 @@ class Finding:
         spread_m: half the range of ``width_m`` over the pieces and traces.
         force_ripple_N: what the command swings by above 30 Hz, peak to peak, in the last quarter.
         felt: whether a hand feels the swing.
+        times_felt: how many times as wide as the least that a hand feels it is; None of one that rests.
         chaotic: whether two copies started a thousandth apart ended apart by a fifth of the swing; None if not asked.
         detail: why the run itself ended, where it diverged, or what failed.
         needs_s: estimate of the time after which a swing that changes too slowly is told; None otherwise.
@@ -117,6 +120,7 @@ class Finding:
     at_hardest: str | None = None
     deeper_N: float | None = None
     deeper: str | None = None
+    times_felt: float | None = None
     counts: float | None = None
     settles_s: float | None = None
     memory_drifts: bool = False
@@ -183,8 +187,10 @@ class Finding:
 
     def _provisos(self, seen_m: float | None, beside: Sequence[str], ripple_N: float | None) -> list[str]:
         """Returns what has to be said in the same breath as ``steady``, or as a swing that lasts."""
+        edge = [EDGE] * (self.times_felt is not None and _EDGE[0] < self.times_felt < _EDGE[1])
         if self.word == "limit-cycle":
-            return [UNFELT] * (not self.felt) + [OTHER_WIDTH] * (not beside and self._is_other(seen_m))
+            unlike = [OTHER_WIDTH] * (not beside and self._is_other(seen_m))
+            return [*edge, *unlike] if edge else [UNFELT] * (not self.felt) + unlike
         holds = {
             "only friction holds it": self.frictionless in ("swings on", "swings on a part of a count deeper"),
             "perhaps only friction holds it": self.frictionless == "undecided",
@@ -193,7 +199,8 @@ class Finding:
             "noise shakes it": NOISE in beside and (seen_m or 0.0) > _SHAKEN_M,
             "its force ripples": (ripple_N or 0.0) > min(_RIPPLES * self.push_N, _RIPPLES_N),
         }
-        return [proviso for proviso, holds_it in holds.items() if holds_it and self.word == "steady"]
+        told = [*edge, *(proviso for proviso, holds_it in holds.items() if holds_it)]
+        return told if self.word == "steady" else []
 
     def _is_other(self, seen_m: float | None) -> bool:
         """Tells whether the run's swing is wider or narrower than that after the push, beyond what both vary by."""
@@ -296,9 +303,11 @@ def _finding(swing: Swing, word: str, why: str) -> Finding:
             needs_s = max(needs_s, swing.watched_s + math.log(max(swing.width_m / felt_m, 1.0)) / -swing.rate_1_s)
     # What is left of a swing that came to rest is rounding, which swings at no frequency.
     frequency_Hz, ripple_N = (0.0, 0.0) if swing.width_m < REST_M else (swing.frequency_Hz, swing.ripple_N)
+    times_felt = max(swing.times_felt, swing.width_m / felt_m)
     return Finding(
         word, why, swing.push_N, swing.watched_s, swing.rate_1_s, swing.error_1_s, frequency_Hz, swing.told_m,
-        swing.spread_m, ripple_N, swing.times_felt >= 1.0 or swing.width_m >= felt_m, None, needs_s, most_1_s,
+        swing.spread_m, ripple_N, times_felt >= 1.0, None, needs_s, most_1_s,
+        times_felt=None if swing.width_m < REST_M or not math.isfinite(times_felt) else times_felt,
         counts=swing.told_m / swing.count_m if swing.count_m and word in ("limit-cycle", "growing") else None,
         settles_s=swing.settles_s if why in ("rest", "unfelt") else None,
     )  # fmt: skip
