@@ -205,8 +205,6 @@ def test_a_run_that_ends_on_the_way_to_its_swing_is_told_to_have_another_and_one
 
 @pytest.mark.parametrize(("word", "felt"), [("steady", False), ("limit-cycle", False), ("limit-cycle", True)])
 @pytest.mark.parametrize(("times_felt", "is_edge"), [(None, False), (0.5, False), (0.9, True), (1.1, True), (3, False)])
-    ("times_felt", "is_edge"), [(None, False), (0.5, False), (0.9, True), (1.1, True), (3.0, False)]
-)
 def test_a_swing_at_the_edge_of_what_a_hand_feels_says_so_whatever_its_word(
     word: str, felt: bool, times_felt: float | None, is_edge: bool
 ) -> None:
