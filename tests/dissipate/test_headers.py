@@ -28,6 +28,7 @@ def recorded(folder: Path, *above: str, rows: list[str] = ROWS, mark: str = ",")
         ("Time,Position", "ms,mm"),
         ("Time,Position", "(ms),[mm]"),
         ("t (ms),x", ",mm"),
+        ("t / ms,x / mm",),
         ("bench of Monday", "", "Time,Position", "ms,mm"),
         ("bench of Monday", "Time (ms),Position (mm)"),
         ("Recorder,bench,of Monday", "Separator,Comma", "t (ms),x (mm)"),

@@ -38,12 +38,15 @@ def from_text(text: str, target: str) -> Decimal:
     raise ValueError(f'Text must carry a unit, such as "{amount} {target}"; a number without one is written unquoted.')
 
 
+_AFTER_SLASH = re.compile(r"(.*?\S)\s+/\s+(\S.*)")
 _IN_BRACKETS = re.compile(r"(.*?)\s*[(\[]([^)\]]*)[)\]]\s*")
 
 
 def name_and_unit(head: str) -> tuple[str, str]:
-    """Returns the name of a column and the unit in its brackets, "" for none: ``"t (ms)"``, ``"force [mN]"``."""
+    """Returns the name of a column and its unit, "" for none: ``"t (ms)"``, ``"force [mN]"``, ``"x / mm"``."""
     match = _IN_BRACKETS.fullmatch(head)
+    if match is None and (after := _AFTER_SLASH.fullmatch(head)) and is_unit(after[2]):
+        match = after
     return (match[1].strip(), match[2].strip()) if match else (head.strip(), "")
 
 

@@ -67,8 +67,8 @@ _SLOWER = (
     "tell apart."
 )
 _FAST = (
-    " Without a frequency it moves by {rms} r.m.s. above {above:g} Hz for a second or more: so do a hand's fast "
-    "motion, blows and noise, but an irregular buzz, too."
+    " It moves by {rms} r.m.s. above {above:g} Hz for a second or more, at no frequency that lasts: so do a hand's "
+    "fast motion, blows, noise, bursts of half a second and what dies away, but an irregular buzz, too."
 )
 # So many times the noise of single positions.
 _BEYOND_NOISE = 3.0

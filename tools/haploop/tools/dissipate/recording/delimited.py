@@ -154,7 +154,7 @@ class DelimitedFile:
         except ValueError:
             name = self.columns[index].name
             raise RecordingError(
-                f"Line {line} of {self.path}: a number was expected in column {name}, not {text!r}."
+                f"Line {line} of {self.path}: a number was expected in column {name}, not {cells[index].strip()!r}."
             ) from None
 
     def _number_text(self, cell: str) -> str:
