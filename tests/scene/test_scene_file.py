@@ -165,7 +165,7 @@ def test_extends_is_a_path_or_a_list_of_them(files, extends):
         (None, "There is no such file."),
         (b"", "The file is empty; a scene needs at least a duration and a [device]."),
         (b"# nothing but this\n", "The file is empty; a scene needs at least a duration and a [device]."),
-        (b'title = "\xff"', "A scene must be UTF-8 text, but byte 9 is not."),
+        (b'# a\ntitle = "\xff"\n', ":2: A scene must be UTF-8 text, but this line is not; save the file as UTF-8."),
         (b"a = 1\nb = = 2\n", ":2: This is not TOML: Invalid value (at line 2, column 5)."),
         (b"a = 1\nb = [2,\n", ":2: This is not TOML: "),
         (b"seed = " + 5000 * b"9", "This is not TOML: "),

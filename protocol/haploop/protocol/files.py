@@ -36,6 +36,11 @@ def read_file(path: str | Path, most_bytes: int = _MOST_BYTES) -> bytes:
     return Path(path).read_bytes()
 
 
+def line_of(error: UnicodeDecodeError) -> int:
+    """Returns the line, from 1, of the byte that is no UTF-8 in what was read whole."""
+    return error.object.count(b"\n", 0, error.start) + 1
+
+
 def read_text(path: str | Path) -> str:
     """Returns a file's UTF-8 text, without a byte order mark; OSError as of ``read_file``, or UnicodeDecodeError."""
     return read_file(path).decode("utf-8-sig")

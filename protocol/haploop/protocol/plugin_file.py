@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from haploop.protocol.files import read_text
+from haploop.protocol.files import line_of, read_text
 from haploop.protocol.installed import Brought, PluginError, bring
 
 # Elements are handed on from hand to hand, since a swap may change the code of one; all else is known by its name.
@@ -37,7 +37,8 @@ def bring_file(path: Path) -> Brought:
     except OSError as error:
         raise PluginError(f"The plugin {path} does not load: {error.strerror}.") from error
     except UnicodeDecodeError as error:
-        raise PluginError(f"The plugin {path} does not load: byte {error.start} is not UTF-8 text.") from error
+        why = f"line {line_of(error)} is not UTF-8 text; save it as such"
+        raise PluginError(f"The plugin {path} does not load: {why}.") from error
     return bring_source(source, str(path))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from haploop.launch.scene.bundled import bundled, like
 from haploop.launch.scene.mistakes import Mistake, SceneError, shown
 from haploop.launch.scene.reading.lines import outline
-from haploop.protocol.files import read_text
+from haploop.protocol.files import line_of, read_text
 from haploop.protocol.scene.table import Tables
 
 # No scene needs tables deeper in one another than this, nor more keys outside of lists; a thousand of them would end
@@ -50,7 +50,8 @@ def parse(
     except OSError as error:
         problem = f"The file cannot be read: {error.strerror}."
     except UnicodeDecodeError as error:
-        problem = f"A {what} must be UTF-8 text, but byte {error.start} is not."
+        line = line_of(error)
+        problem = f"A {what} must be UTF-8 text, but this line is not; save the file as UTF-8."
     except ValueError as error:
         line = _line_of(str(error), text)
         problem = f"This is not TOML: {error}.{_hint(str(error), text)} Other mistakes are told once it is."

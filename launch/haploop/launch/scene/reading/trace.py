@@ -7,7 +7,7 @@ from pathlib import Path
 
 from haploop.launch.scene.models import fault
 from haploop.launch.scene.units import is_number, name_and_unit, scale_of
-from haploop.protocol.files import read_text
+from haploop.protocol.files import line_of, read_text
 
 
 class TraceError(ValueError):
@@ -25,7 +25,8 @@ def read_trace(path: Path) -> tuple[list[float], list[float]]:
     try:
         rows = list(csv.reader(read_text(path).splitlines()))
     except UnicodeDecodeError as error:
-        raise TraceError(f"The recording must be UTF-8 text, but byte {error.start} is not.") from error
+        line = line_of(error)
+        raise TraceError(f"The recording must be UTF-8 text, but line {line} is not; save it as such.") from error
     except OSError as error:
         raise TraceError(f"The recording cannot be read: {error.strerror}.") from error
     except csv.Error as error:
