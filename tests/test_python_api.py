@@ -231,7 +231,7 @@ def test_numbers_of_the_summary_come_with_their_units(scene: Scene) -> None:
 
 
 def test_a_run_that_was_not_pushed_is_never_called_steady() -> None:
-    scene = load(SCENES / "fig6b.toml", {"duration": 2.5, "wall.stiffness": "20 N/m"})
+    scene = load(SCENES / "fig6b.toml", {"duration": 2.5, "wall.stiffness": "30 N/m"})
     seen, pushed = run(scene.set({"run.verdict": "window"})), run(scene)
     assert (seen.verdict, pushed.verdict) == ("no-swing-seen", "steady")
     assert repr(seen).startswith("<no-swing-seen: ")
