@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 
 from haploop.launch.clock.pace import LATENESS
-from haploop.launch.stability.decide import BESIDE, Finding
+from haploop.launch.stability.finding import BESIDE, Finding
 from haploop.logger.books.meanings import BOOKS
 from haploop.logger.entries import ENERGY, PARTS, RUN
 from haploop.logger.log.channels import CONTROLLER, OWN, PLANT, TIME, Column

@@ -12,7 +12,8 @@ from oracles.snapshots import contact
 pytestmark = pytest.mark.slow
 AXE = Path(__file__).parent / "node_modules/axe-core/axe.min.js"
 EVENT = {"tick": 500, "t_s": 0.5, "text": "set", "kind": "set"}
-SCHEMES = ("light", "dark")
+# The scheme of Firefox is the system's: its driver cannot choose it.
+AXE_IN = [("chromium", "light"), ("chromium", "dark"), ("firefox", "light")]
 PANELS = ("energy", "spectrum", "compare", "motion", "own")
 RUN = "within => axe.run(within, {resultTypes: ['violations']}).then(found => found.violations" \
       ".map(one => `${one.id}: ${one.nodes[0].target} and ${one.nodes.length - 1} more`))"  # fmt: skip
@@ -31,8 +32,7 @@ def violations():
     return violations
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("browser", ["chromium"], indirect=True)
+@pytest.mark.parametrize(("browser", "scheme"), AXE_IN, indirect=["browser"])
 def test_no_state_of_the_page_has_a_violation(stand_in, open_page, violations, scheme):
     stand_in.state(own=True)
     stand_in.tell(RUNS, {"type": "events", "events": [EVENT]})
@@ -57,15 +57,3 @@ def test_no_state_of_the_page_has_a_violation(stand_in, open_page, violations, s
     assert violations(page) == []
     page.evaluate("document.querySelector('main').insertAdjacentHTML('beforeend', '<img src=\"/static/icon.svg\">')")
     assert len(violations(page)) == 1, "an image without words is seen"
-
-
-@pytest.mark.parametrize("browser", ["firefox"], indirect=True)
-def test_nor_has_it_one_in_another_browser(stand_in, open_page, violations):
-    """Its rules see the same document, laid out anew; its scheme is the system's, which its driver cannot choose."""
-    stand_in.state(own=True)
-    stand_in.show(contact())
-    page = open_page(stand_in.url, viewport=DESK)
-    expect(page.locator("#force .legend")).to_contain_text("total")
-    assert violations(page) == []
-    page.set_viewport_size(PHONE)
-    assert violations(page) == []

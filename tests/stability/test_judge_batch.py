@@ -66,8 +66,8 @@ def within_counts() -> list[Scene]:
 
 
 FAMILIES: dict[str, Callable[[], list[Scene]]] = {
-    "plain": lambda: shipped("fig6a", [20.0, 3000.0]),
-    "inertia": lambda: shipped("fig6c", [20.0, 60.0]),
+    "plain": lambda: shipped("fig6a", [20.0, 200.0, 3000.0]),
+    "inertia": lambda: shipped("fig6c", [20.0, 60.0, 150.0]),
     "trembling": trembling,
     "friction": rubbing,
     "swaying": swaying,

@@ -6,7 +6,7 @@ import pytest
 
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
-from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.finding import Finding
 from helpers.scenes.least import scene
 from helpers.scenes.pressed import pressed
 

@@ -11,7 +11,8 @@ import pytest
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.stability import looks
-from haploop.launch.stability.decide import Finding, decide
+from haploop.launch.stability.decide import decide
+from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.judge import judge
 from haploop.launch.stability.looks import LOOKS_S
 from haploop.launch.stability.swing import Swing

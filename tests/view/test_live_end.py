@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from haploop.launch.spec import RunFailed
-from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.finding import Finding
 from haploop.logger import read
 from haploop.logger.summary import read as read_summary
 from haploop.tools.cli.live_runs import LiveRuns

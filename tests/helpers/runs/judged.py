@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from haploop.controller.dissipation import registry
-from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.judge import end_of, judge_scene
 from haploop.launch.stability.still_hand import End
 from haploop.protocol.scene.scene import Scene

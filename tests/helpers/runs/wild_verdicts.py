@@ -11,7 +11,7 @@ from itertools import islice
 from typing import Any, NamedTuple
 
 from haploop.controller.dissipation import registry
-from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.judge import judge_scene
 from haploop.launch.stability.looks import LOOKS_S
 from haploop.protocol.scene.scene import Scene

@@ -12,7 +12,7 @@ from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError
 from haploop.launch.scene.events import scene_events
 from haploop.launch.spec import RunFailed
-from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.judge import end_at, judge, with_verdict
 from haploop.launch.stability.looks import LOOKS_S
 from haploop.launch.stability.still_hand import End

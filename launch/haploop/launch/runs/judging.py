@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from haploop.controller.dissipation import Element, ElementError, registry
-from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.judge import judge_scene
 from haploop.launch.stability.looks import LOOKS_S
 from haploop.protocol.changes import Event

@@ -18,7 +18,7 @@ from haploop.protocol.scene.scene import Scene
 
 if TYPE_CHECKING:
     from haploop.launch.processes.early import Started
-    from haploop.launch.stability.decide import Finding
+    from haploop.launch.stability.finding import Finding
     from haploop.logger.summary import Summary
     from haploop.protocol.changes import Event
 

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
+from haploop.launch.stability.finding import STILL_1_S, Finding
 from haploop.launch.stability.swing import REST_M, SAME, Swing
 from haploop.launch.stability.traces import is_felt, smallest_felt_m
-from haploop.launch.stability.why import AFTER_BLOW, AT_HARDEST, DECAYING, DEEPER, FRICTIONLESS, WHY
-from haploop.logger.verdict.measures import WINDOW_S
 
 # A swing that dies is watched until it is this small, or for long.
 _SMALL_M = 20e-6
@@ -25,218 +22,14 @@ _COUNTED_PERIODS = 60.0
 _DIES_1_S = 0.01
 # After so long, swings of both sizes that grow alike grow for good, and what is known not to change lasts.
 _ALIKE_S = 4.0
-# Swings of the loop and of its run whose widths differ by more than this are not the same.
-_WIDER = 1.2
 # A frequency is known from so many periods on.
 _SEEN_PERIODS = 6.0
 # How a swing changes is told by so many, wherever its turns fall.
 _TELLING_PERIODS = 7.0
-# A run of more than this is asked of nobody.
-_LONGEST_S = 3600.0
 # A command that ripples by less is constant, but for rounding.
 _STILL_N = 1e-9
-# A command whose ripple is more than this share of the push, a tenth of the hold, or this, is told of beside the word;
-# so is noise that moves the device by as much as a hand feels from 25 Hz on, peak to peak.
-_RIPPLES, _RIPPLES_N, _SHAKEN_M = 0.33, 0.1, 10e-6
-HAND_MOVES, NOISE = "the hand's motion", "noise"
-UNFELT, OTHER_WIDTH = "less than a hand feels", "of another width than in its run"
-# Thresholds of touch are known to a quarter, from person to person less well.
-EDGE, _EDGE = "at the edge of what a hand feels", (0.8, 1.25)
 # Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
 _COUNTS = 10
-
-# A width below this is told in micrometres; what changes by less than this has come to its end.
-_FINE_UM, _STILL_1_S = 10.0, 0.05
-
-# What ``Finding.entries`` tells of the run beside the finding.
-BESIDE = {
-    "own_share": "which share of the oscillation in the run's last window the loop keeps up by itself; the rest is the "
-    "hand's own motion or noise, or dies away; null where that cannot be told",
-    "moved_beside": "what else moved the run at its end: the hand's motion, noise",
-    "provisos": "what the verdict rests on, to be said in the same breath",
-}
-# Numbers that only a push gives.
-_OF_PUSH = ("push_N", "watched_s", "frequency_Hz", "width_m", "spread_m", "force_ripple_N")
-_DOES = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on", "diverged": "swings on"}
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What was found of a loop whose hand is held still; a summary tells None for the sizes of what was not pushed.
-
-    Attributes:
-        word: steady, limit-cycle, growing, diverged, no-contact or undecided.
-        why: what was found, in short, such as ``rest`` or ``forgets``: a key of ``why.WHY``.
-        push_N: the larger of the two pushes, in magnitude; 0 of a run that diverged or ended out of contact, and was
-            not pushed.
-        watched_s: time looked at, since the push.
-        rate_1_s: the r of e^(r t) by which the steadier of the two swings grows; negative: it decays; None where it
-            died within a few pieces.
-        error_1_s: standard error of ``rate_1_s``.
-        frequency_Hz: frequency of the swing that remains at the end; 0 where none does.
-        width_m: width of the swing that remains, peak to peak: the mean over the last quarter of both traces.
-        spread_m: half the range of ``width_m`` over the pieces and traces.
-        force_ripple_N: what the command swings by above 30 Hz, peak to peak, in the last quarter.
-        felt: whether a hand feels the swing.
-        times_felt: how many times as wide as the least that a hand feels it is; None of one that rests.
-        chaotic: whether two copies started a thousandth apart ended apart by a fifth of the swing; None if not asked.
-        detail: why the run itself ended, where it diverged, or what failed.
-        needs_s: estimate of the time after which a swing that changes too slowly is told; None otherwise.
-        most_1_s: what either swing may grow or decay by: its rate and two standard errors, of the one that may change
-            most; None where it was not watched to an answer.
-        blow_N: of a loop that rests after the push, a harder one, into the wall and off it; None if not asked.
-        blown: what it does after these: rests, rests off the wall, swings on, or undecided; None if not asked.
-        frictionless: what a loop that rests, too, after these would do after the push without its friction: rests,
-            swings on, swings on a part of a count deeper, or undecided; None if not asked, and of a loop without.
-        deeper_N: of a loop without friction that rests, by how much harder the hand holds it where it lies a part of an
-            encoder's count deeper; None if not asked, and without counts.
-        deeper: what it does there: rests, swings on, or undecided; None if not asked.
-        hardest_N: of a loop that rests then, too, the hardest hold that its hand came to; None if that was about the
-            last one, or the hand stays.
-        at_hardest: what it does there: rests, swings on, or undecided; None if not asked.
-        counts: of a swing behind an encoder, its width in counts; None of any other.
-        settles_s: how long after the push it came within 5 % of where it rests; None of one that does not.
-        memory_drifts: whether what an element remembers still goes on changing where the loop rests.
-    """
-
-    word: str
-    why: str
-    push_N: float = 0.0
-    watched_s: float = 0.0
-    rate_1_s: float | None = None
-    error_1_s: float | None = None
-    frequency_Hz: float = 0.0
-    width_m: float = 0.0
-    spread_m: float = 0.0
-    force_ripple_N: float = 0.0
-    felt: bool = False
-    chaotic: bool | None = None
-    needs_s: float | None = None
-    most_1_s: float | None = None
-    blow_N: float | None = None
-    blown: str | None = None
-    frictionless: str | None = None
-    hardest_N: float | None = None
-    at_hardest: str | None = None
-    deeper_N: float | None = None
-    deeper: str | None = None
-    times_felt: float | None = None
-    counts: float | None = None
-    settles_s: float | None = None
-    memory_drifts: bool = False
-    detail: str = ""
-
-    @property
-    def tells(self) -> bool:
-        """Tells whether watching for longer would show nothing else."""
-        return (self.word != "undecided" or self.why == "rests off the wall") and not self.memory_drifts
-
-    def after_blow(self, found: Finding) -> Finding:
-        """Returns the finding with what was found after a harder push: undecided unless it rests then, too."""
-        blown = found.why if found.why == "rests off the wall" else _DOES.get(found.word, "undecided")
-        drift = self.memory_drifts or found.memory_drifts
-        struck = replace(self, blow_N=found.push_N, blown=blown, memory_drifts=drift)
-        return struck if blown.startswith("rests") else replace(struck, word="undecided", why="rested")
-
-    def held_harder(self, hold_N: float, found: Finding) -> Finding:
-        """Returns the finding with what was found at a harder hold: undecided unless it rests there, too."""
-        does = _DOES.get(found.word, "undecided")
-        drift = self.memory_drifts or found.memory_drifts
-        told = replace(self, hardest_N=abs(hold_N), at_hardest=does, memory_drifts=drift)
-        return told if does == "rests" else replace(told, word="undecided", why="rested")
-
-    @property
-    def rests_freely(self) -> bool:
-        """Tells whether it rests without friction, wherever it was held."""
-        return self.word == "steady" and self.frictionless in (None, "rests")
-
-    def held_deeper(self, more_N: float, found: Finding) -> Finding:
-        """Returns the finding of a loop that rests with what was found a part of a count deeper, without friction.
-
-        One that has none is undecided unless it rests there, too.
-        """
-        does = _DOES.get(found.word, "undecided")
-        if self.frictionless:
-            return replace(self, frictionless=f"{does} a part of a count deeper" if does == "swings on" else does)
-        drift = self.memory_drifts or found.memory_drifts
-        told = replace(self, deeper_N=abs(more_N), deeper=does, memory_drifts=drift)
-        return told if does == "rests" else replace(told, word="undecided", why="rested")
-
-    def without_friction(self, found: Finding) -> Finding:
-        """Returns the finding with what was found after the same push of the loop without its friction."""
-        return replace(self, frictionless=_DOES.get(found.word, "undecided"))
-
-    def entries(
-        self, seen_m: float | None = None, beside: Sequence[str] = (), ripple_N: float | None = None
-    ) -> dict[str, Any]:
-        """Returns what a summary tells of it: the word, why as a sentence, and the numbers as its ``stability``.
-
-        Args:
-            seen_m: how far the run itself swung at its end, peak to peak.
-            beside: what else moved the run there, see ``moved_beside``.
-            ripple_N: what its command swung by above 30 Hz there, peak to peak.
-        """
-        numbers = {name: value for name, value in vars(self).items() if name not in ("word", "detail")}
-        if not self.push_N:
-            numbers |= dict.fromkeys(_OF_PUSH)
-        # A swing that nothing else moves is the loop's own, and differs from the one after a push by chance alone.
-        is_told = beside or self.word == "steady"
-        told = self.own_share(seen_m) if is_told else None, [*beside], self._provisos(seen_m, beside, ripple_N)
-        numbers |= zip(BESIDE, told, strict=True)
-        return {"verdict": self.word, "verdict_rule": self.sentence(), "stability": numbers}
-
-    def _provisos(self, seen_m: float | None, beside: Sequence[str], ripple_N: float | None) -> list[str]:
-        """Returns what has to be said in the same breath as ``steady``, or as a swing that lasts."""
-        edge = [EDGE] * (self.times_felt is not None and _EDGE[0] < self.times_felt < _EDGE[1])
-        if self.word == "limit-cycle":
-            unlike = [OTHER_WIDTH] * (not beside and self._is_other(seen_m))
-            return [*edge, *unlike] if edge else [UNFELT] * (not self.felt) + unlike
-        holds = {
-            "only friction holds it": self.frictionless in ("swings on", "swings on a part of a count deeper"),
-            "perhaps only friction holds it": self.frictionless == "undecided",
-            "an element's memory still changes": self.memory_drifts,
-            "at some holds of its hand": HAND_MOVES in beside,
-            "noise shakes it": NOISE in beside and (seen_m or 0.0) > _SHAKEN_M,
-            "its force ripples": (ripple_N or 0.0) > min(_RIPPLES * self.push_N, _RIPPLES_N),
-        }
-        told = [*edge, *(proviso for proviso, holds_it in holds.items() if holds_it)]
-        return told if self.word == "steady" else []
-
-    def _is_other(self, seen_m: float | None) -> bool:
-        """Tells whether the run's swing is wider or narrower than that after the push, beyond what both vary by."""
-        if not seen_m or self.chaotic or self.frequency_Hz * WINDOW_S < 1.0:
-            return False
-        most_m, least_m = self.width_m + 2.0 * self.spread_m, self.width_m - 2.0 * self.spread_m
-        return not least_m / _WIDER <= seen_m <= most_m * _WIDER
-
-    def own_share(self, seen_m: float | None) -> float | None:
-        """Returns which share of the swing seen in the run the loop keeps up by itself, with a still hand and no noise.
-
-        What is left is the hand's own motion, the noise, or dies away. None where it cannot be told: of a loop that
-        does not settle, of a run that did not swing, and where the loop swings wider than the run did.
-        """
-        if self.word not in ("steady", "limit-cycle") or not seen_m or seen_m < REST_M:
-            return None
-        own_m = 0.0 if self.why == "decays" else self.width_m
-        return min(own_m / seen_m, 1.0) if own_m < _WIDER * seen_m else None
-
-    def _decaying(self) -> str:
-        """Returns whether what is left becomes less yet, beyond three standard errors; "" where it does not."""
-        rate_1_s, error_1_s = self.rate_1_s or 0.0, self.error_1_s or 0.0
-        return DECAYING.format(-rate_1_s, error_1_s) if rate_1_s < -max(3.0 * error_1_s, _STILL_1_S) else ""
-
-    def sentence(self) -> str:
-        """Returns why, with its numbers."""
-        numbers = {name: math.nan if value is None else value for name, value in vars(self).items()}
-        width_um = 1e6 * self.width_m
-        width = f"{1e-3 * width_um:.3g} mm" if width_um >= _FINE_UM else f"{width_um:.3g} µm"
-        about_s = float(f"{numbers['needs_s']:.2g}")
-        run = f"some {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
-        sentence = WHY[self.why].format(**numbers, width=width, width_um=width_um, run=run, decaying=self._decaying())
-        sentence += AFTER_BLOW[self.blown].format(**numbers) if self.blown else ""
-        sentence += AT_HARDEST[self.at_hardest].format(**numbers) if self.at_hardest else ""
-        sentence += DEEPER[self.deeper].format(**numbers) if self.deeper else ""
-        return sentence + (FRICTIONLESS[self.frictionless] if self.frictionless else "")
 
 
 def decide(swing: Swing, *, last: bool) -> Finding:
@@ -255,7 +48,7 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     # Of what is too slow for its pieces all of its way counts, since they show but a part of it.
     size_m = swing.width_m if swing.covers else swing.moved_m
     # In half of a short watch even what grows quickly changes little.
-    least = min(_LASTING, _STILL_1_S * swing.watched_s / 2.0)
+    least = min(_LASTING, STILL_1_S * swing.watched_s / 2.0)
     rising = any(change > max(least, 3 * error) for change, error in changes)
     falling = max(swing.changes) < -_LASTING and (size_m < _SMALL_M or (is_long and swing.covers))
     forgets = swing.lasts(_LASTING) and SAME[0] < swing.at_last < SAME[1] and not 0.5 < swing.at_first < 2.0
@@ -308,6 +101,6 @@ def _finding(swing: Swing, word: str, why: str) -> Finding:
         word, why, swing.push_N, swing.watched_s, swing.rate_1_s, swing.error_1_s, frequency_Hz, swing.told_m,
         swing.spread_m, ripple_N, times_felt >= 1.0, None, needs_s, most_1_s,
         times_felt=None if swing.width_m < REST_M or not math.isfinite(times_felt) else times_felt,
-        counts=swing.told_m / swing.count_m if swing.count_m and word in ("limit-cycle", "growing") else None,
+        counts=swing.told_m / swing.count_m if swing.count_m and word == "limit-cycle" else None,
         settles_s=swing.settles_s if why in ("rest", "unfelt") else None,
     )  # fmt: skip

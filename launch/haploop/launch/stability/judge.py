@@ -11,7 +11,7 @@ import numpy as np
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element, ElementError
 from haploop.launch.scene.events import scene_events
-from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.looks import (
     BESIDE,
     BLOWS,

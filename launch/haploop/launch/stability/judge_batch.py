@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from haploop.launch.batch.batch import BatchEnd
-from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.looks import (
     BESIDE,
     BLOWS,

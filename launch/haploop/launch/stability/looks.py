@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from haploop.launch.stability.decide import HAND_MOVES, NOISE, Finding, decide
+from haploop.launch.stability.decide import decide
+from haploop.launch.stability.finding import HAND_MOVES, NOISE, Finding
 from haploop.launch.stability.still_hand import LEAST_PRESS_N, press_of
 from haploop.launch.stability.swing import Pushed, measure
 from haploop.protocol.scene.hand_force import constant_from_s

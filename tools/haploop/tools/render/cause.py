@@ -22,10 +22,11 @@ _NOTHING = "{when} the wall moved no energy at all: what moves here is not fed b
 _WALL = (
     "{when} the wall gave the device {energy} more than an ideal one would have, {share:.0f} % of it because {because}."
 )
-# A loop without counts has no swing of a width of its own so small: it dies, or grows.
+# A linear loop without counts has no swing of a width of its own: it dies, or grows.
 _MOST_COUNTS = 2.0
 _COUNTS = (
-    "the encoder: it swings by {counts:.2g} of its counts. Within two a swing is set off by them, whatever feeds it. "
+    "the encoder: it swings by {counts:.2g} of its counts. A swing within two comes of them as a rule, whatever feeds "
+    "it; the same scene with a finer encoder tells. "
 )
 # The books of wall and elements are those of the commands, and the actuator has one of its own.
 _LIMITED = " That is by what was commanded: the actuator's limits kept {kept} of it back."
@@ -40,7 +41,7 @@ def likely_cause(summary: Summary) -> str:
     """
     counts = summary.get("stability", {}).get("counts")
     of_counts = _COUNTS.format(counts=counts) if counts and counts < _MOST_COUNTS else ""
-    return of_counts + cause(summary["energy"])
+    return (of_counts + cause(summary["energy"])).rstrip()
 
 
 def cause(energy: Summary, when: str = "In all") -> str:

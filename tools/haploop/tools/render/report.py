@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from haploop.launch.plan.meant.rule import Note
-    from haploop.launch.stability.decide import Finding
+    from haploop.launch.stability.finding import Finding
     from haploop.logger.summary import Summary
     from haploop.protocol.transport.wire import Message
 

@@ -11,7 +11,7 @@ from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.result import unit_of
 from haploop.launch.scene.events import scene_events
 from haploop.launch.spec import RunFailed
-from haploop.launch.stability.decide import Finding
+from haploop.launch.stability.finding import Finding
 from haploop.logger.summary import OF_THE_MACHINE, Summary
 from haploop.protocol.changes import at_work, changes_of
 from haploop.protocol.names import nearest

@@ -196,7 +196,8 @@ def _open_lines(path: Path) -> Iterator[Iterator[str]]:
         try:
             yield iter(file)
         except UnicodeDecodeError as error:
-            code = "UTF-16" if path.read_bytes()[:2] in _UTF_16 else "CP1252"
+            with path.open("rb") as bytes_of:
+                code = "UTF-16" if bytes_of.read(2) in _UTF_16 else "CP1252"
             raise RecordingError(
                 f"The recording {path} must be UTF-8 text, which it is not; save it as such, or turn it into it: iconv "
                 f"-f {code} -t UTF-8 {shlex.quote(path.name)} > other.csv."
