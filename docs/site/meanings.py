@@ -16,6 +16,7 @@ from haploop.plant.counters import COUNTERS
 
 # What a finding has that no summary holds under this name.
 _NOT_TOLD = ("word", "detail")
+_WITHOUT = "what the loop does without this part, or with an encoder 1000 times as fine: rests, swings on, or undecided"
 
 
 def attributes(kind: type) -> dict[str, str]:
@@ -36,7 +37,7 @@ def summary() -> dict[str, str]:
     beside = {f"{name}.N" if name != "own_share" else name: text for name, text in BESIDE.items()}
     return {
         **RUN,
-        **_under("stability", finding | beside),
+        **_under("stability", finding | beside | {"without.NAME": _WITHOUT}),
         **_under("window", attributes(Figures)),
         **_under("extremes", attributes(Extremes)),
         **ENERGY,
@@ -49,7 +50,9 @@ def summary() -> dict[str, str]:
 def pattern(key: str) -> str:
     """Returns a dotted key of a summary with N for every place in a list and NAME for every name of the scene's."""
     key = re.sub(r"(?<=\.)\d+(?=\.|$)", "N", key)
-    return re.sub(r"(?<=\.parameters\.)\w+|(?<=^versions\.)\w+|(?<=^programs\.)\w+", "NAME", key)
+    return re.sub(
+        r"(?<=\.parameters\.)\w+|(?<=^versions\.)\w+|(?<=^programs\.)\w+|(?<=^stability\.without\.)\w+", "NAME", key
+    )
 
 
 def columns() -> dict[str, dict[str, Column]]:

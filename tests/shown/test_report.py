@@ -92,20 +92,41 @@ def test_a_run_that_was_not_judged_is_told_by_what_was_seen_also_by_a_summary_of
 
 @pytest.mark.parametrize(("verdict", "is_told"), [("steady", False), ("limit-cycle", True), ("growing", True)])
 def test_the_likely_cause_is_told_of_what_swings_alone(swap: dict[str, Any], verdict: str, is_told: bool) -> None:
-    text = " ".join(shown(summary_table({**swap, "verdict": verdict})).split())
+    without_trials = {**swap, "verdict": verdict, "stability": swap["stability"] | {"without": None}}
+    text = " ".join(shown(summary_table(without_trials)).split())
     assert (f"Likely cause: {cause(swap['energy'])}" in text) == is_told
 
 
 @pytest.mark.parametrize(
-    ("counts", "is_told"), [(None, False), (0.43, True), (1.9, True), (2.1, False), (300.0, False)]
+    ("without", "told"),
+    [
+        ({"delay": "rests", "encoder": "swings on"}, "the delay."),
+        ({"delay": "undecided", "encoder": "rests"}, "the encoder's counts."),
+        ({"elements": "rests"}, "the dissipation elements."),
+        (
+            {"delay": "rests", "encoder": "swings on", "elements": "rests"},
+            "the delay and the dissipation elements together, since it rests without any one of them.",
+        ),
+        (
+            {"delay": "swings on", "encoder": "swings on", "all": "rests"},
+            "no single part, since it swings on without any one of them.",
+        ),
+        ({"delay": "swings on", "encoder": "swings on", "all": "swings on"}, "the hold of each force over a tick, or"),
+        ({"encoder": "swings on"}, "the hold of each force over a tick, or"),
+        ({"delay": "swings on", "encoder": "undecided", "all": "rests"}, "not told by these trials."),
+        ({"delay": "swings on", "encoder": "swings on", "all": "undecided"}, "not told by these trials."),
+    ],
 )
-def test_a_swing_within_two_counts_of_the_encoder_is_said_to_come_of_them_before_its_energy(
-    swap: dict[str, Any], counts: float | None, is_told: bool
+def test_the_part_without_which_a_loop_rests_is_its_likely_cause_with_every_trial_and_the_books_beside_it(
+    swap: dict[str, Any], without: dict[str, str], told: str
 ) -> None:
-    stability = swap["stability"] | {"counts": counts}
+    stability = swap["stability"] | {"without": without}
     text = " ".join(shown(summary_table({**swap, "verdict": "limit-cycle", "stability": stability})).split())
-    assert ("Likely cause: the encoder: it swings by" in text) == is_told
-    assert cause(swap["energy"]) in text
+    assert f"Likely cause: {told}" in text
+    assert ("rests without its delay" in text) == (without.get("delay") == "rests")
+    assert ("swings on with an encoder 1000 times as fine" in text) == (without.get("encoder") == "swings on")
+    assert ("is undecided without all of these" in text) == (without.get("all") == "undecided")
+    assert cause(swap["energy"], "By the books of the whole run") in text
 
 
 def energy(*elements: tuple[str, float], **leak: float) -> dict[str, Any]:

@@ -93,15 +93,3 @@ def test_without_counts_or_without_a_wall_nothing_is_held_deeper() -> None:
     of = replace(scene(), encoder=None)
     assert deeper_holds(of, Spring(0.0, 900.0, -1.0), -1.0) == []
     assert deeper_holds(replace(of, encoder=Encoder(resolution=COUNT_M)), Spring(0.0, 0.0, -1.0), -1.0) == []
-
-
-@pytest.mark.slow
-def test_a_swing_that_counts_set_off_is_told_in_counts_and_is_gone_with_a_finer_encoder() -> None:
-    """The counter-example of a wall far below its limit: its books blame the delay."""
-    coarse, fine = (
-        judge(ended(premium(800.0, "friction.kinetic=0", "dissipation=[]", f"encoder.resolution={count}")), LOOKS_S)
-        for count in (2e-4, 1e-7)
-    )
-    assert (coarse.word, fine.word, fine.counts) == ("limit-cycle", "steady", None)
-    assert coarse.counts == pytest.approx(coarse.width_m / 2e-4)
-    assert coarse.width_m < 2.0 * 2e-4

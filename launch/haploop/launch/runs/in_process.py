@@ -12,6 +12,7 @@ from haploop.controller.controller import Controller
 from haploop.controller.dissipation import ElementError
 from haploop.launch.scene.events import scene_events
 from haploop.launch.spec import RunFailed
+from haploop.launch.stability.causes import with_causes
 from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.judge import end_at, judge, with_verdict
 from haploop.launch.stability.looks import LOOKS_S
@@ -41,6 +42,7 @@ def run_in_process(
     on_progress: Callable[[Message], None] | None = None,
     memory: MemoryLog | None = None,
     stop: Callable[[], bool] = lambda: False,
+    causes: bool = False,
 ) -> Summary:
     """Runs a resolved scene to its end and returns the summary.
 
@@ -51,6 +53,7 @@ def run_in_process(
         on_progress: called now and then with the logger's status.
         memory: where to log without a directory.
         stop: asked after every block; True ends the run there.
+        causes: whether a loop that swings at the end is tried without its delay, counts and elements.
 
     Raises:
         RunFailed: an element raised, or gave something that is no number.
@@ -75,7 +78,7 @@ def run_in_process(
         if not (why := raised_in_file(error)):
             raise
         loop.fail(f"What a plugin file brings failed: {why}")
-    return loop.judged(out)
+    return loop.judged(out, causes)
 
 
 class Loop:
@@ -131,13 +134,16 @@ class Loop:
         """Closes the books and returns the summary; ``failed`` says why the run could not go on."""
         return self._session.close(failed, self._plant.stop_reason, self._controller.recorder.trouble, 0)
 
-    def judged(self, out: Path | None) -> Summary:
+    def judged(self, out: Path | None, causes: bool = False) -> Summary:
         """Closes the books of a run that came to its end and returns the summary with the verdict it asks for."""
         summary, logger = self.finish(), self._session.logger
 
         def find() -> Finding:
             [inside] = logger.window.contacts(np.zeros(1, np.intp))
             end = end_at(self._scene, self._plant, self._controller, inside)
-            return judge(end, LOOKS_S, thorough=True) if isinstance(end, End) else end
+            if not isinstance(end, End):
+                return end
+            found = judge(end, LOOKS_S, thorough=True)
+            return with_causes(end, found) if causes else found
 
         return with_verdict(self._scene, summary, find, out)

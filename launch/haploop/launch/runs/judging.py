@@ -57,7 +57,7 @@ def find(
 ) -> Finding:
     """Judges a run here, with the code of these kinds; undecided where it fails."""
     try:
-        return judge_scene(scene, kinds, events, LOOKS_S, thorough=True, on_exchange=on_exchange)
+        return judge_scene(scene, kinds, events, LOOKS_S, thorough=True, causes=True, on_exchange=on_exchange)
     except (ElementError, ArithmeticError) as error:
         return Finding("undecided", "failed", detail=str(error))
 

@@ -72,7 +72,7 @@ def replay(directory: Path) -> Replay:
         return _replay_half(scene, kinds, events, recorded, before, foreign)
     with tempfile.TemporaryDirectory(prefix="haploop-replay-") as scratch:
         try:
-            summary = run_in_process(scene, kinds, out=Path(scratch), events=events)
+            summary = run_in_process(scene, kinds, out=Path(scratch), events=events, causes=True)
         except RunFailed:  # then ticks are missing, and the comparison says so
             summary = recorded_summary(Path(scratch)) or {}
         except LogError as error:

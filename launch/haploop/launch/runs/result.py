@@ -138,7 +138,9 @@ def run(
     bring(scene.brought)
     if out is None and not processes:
         memory = MemoryLog()
-        summary = run_in_process(scene.scene, dict(scene.kinds), attachments={SCENE: str(scene)}, memory=memory)
+        summary = run_in_process(
+            scene.scene, dict(scene.kinds), attachments={SCENE: str(scene)}, memory=memory, causes=True
+        )
         return Result(scene, summary, None, memory.recording())
     if processes:
         _check_files(scene)

@@ -164,6 +164,7 @@ def run(
             attachments=spec.attachments,
             on_progress=spec.on_progress,
             stop=stop,
+            causes=True,
         )
 
 

@@ -101,6 +101,5 @@ def _finding(swing: Swing, word: str, why: str) -> Finding:
         word, why, swing.push_N, swing.watched_s, swing.rate_1_s, swing.error_1_s, frequency_Hz, swing.told_m,
         swing.spread_m, ripple_N, times_felt >= 1.0, None, needs_s, most_1_s,
         times_felt=None if swing.width_m < REST_M or not math.isfinite(times_felt) else times_felt,
-        counts=swing.told_m / swing.count_m if swing.count_m and word == "limit-cycle" else None,
         settles_s=swing.settles_s if why in ("rest", "unfelt") else None,
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,7 +34,7 @@ BESIDE = {
 }
 # Numbers that only a push gives.
 _OF_PUSH = ("push_N", "watched_s", "frequency_Hz", "width_m", "spread_m", "force_ripple_N")
-_DOES = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on", "diverged": "swings on"}
+DOES = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on", "diverged": "swings on"}
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,9 @@ class Finding:
         hardest_N: of a loop that rests then, too, the hardest hold that its hand came to; None if that was about the
             last one, or the hand stays.
         at_hardest: what it does there: rests, swings on, or undecided; None if not asked.
-        counts: of a limit cycle behind an encoder, its width in counts; None of any other.
+        without: of a loop that swings, what it does without its ``delay``, with a much finer ``encoder``, without its
+            ``elements``, and without ``all`` of these where it swings on without any: rests, swings on, or undecided;
+            None if not asked.
         settles_s: how long after the push it came within 5 % of where it rests; None of one that does not.
         memory_drifts: whether what an element remembers still goes on changing where the loop rests.
     """
@@ -98,7 +100,7 @@ class Finding:
     deeper_N: float | None = None
     deeper: str | None = None
     times_felt: float | None = None
-    counts: float | None = None
+    without: Mapping[str, str] | None = None
     settles_s: float | None = None
     memory_drifts: bool = False
     detail: str = ""
@@ -110,14 +112,14 @@ class Finding:
 
     def after_blow(self, found: Finding) -> Finding:
         """Returns the finding with what was found after a harder push: undecided unless it rests then, too."""
-        blown = found.why if found.why == "rests off the wall" else _DOES.get(found.word, "undecided")
+        blown = found.why if found.why == "rests off the wall" else DOES.get(found.word, "undecided")
         drift = self.memory_drifts or found.memory_drifts
         struck = replace(self, blow_N=found.push_N, blown=blown, memory_drifts=drift)
         return struck if blown.startswith("rests") else replace(struck, word="undecided", why="rested")
 
     def held_harder(self, hold_N: float, found: Finding) -> Finding:
         """Returns the finding with what was found at a harder hold: undecided unless it rests there, too."""
-        does = _DOES.get(found.word, "undecided")
+        does = DOES.get(found.word, "undecided")
         drift = self.memory_drifts or found.memory_drifts
         told = replace(self, hardest_N=abs(hold_N), at_hardest=does, memory_drifts=drift)
         return told if does == "rests" else replace(told, word="undecided", why="rested")
@@ -132,7 +134,7 @@ class Finding:
 
         One that has none is undecided unless it rests there, too.
         """
-        does = _DOES.get(found.word, "undecided")
+        does = DOES.get(found.word, "undecided")
         if self.frictionless:
             return replace(self, frictionless=f"{does} a part of a count deeper" if does == "swings on" else does)
         drift = self.memory_drifts or found.memory_drifts
@@ -141,7 +143,7 @@ class Finding:
 
     def without_friction(self, found: Finding) -> Finding:
         """Returns the finding with what was found after the same push of the loop without its friction."""
-        return replace(self, frictionless=_DOES.get(found.word, "undecided"))
+        return replace(self, frictionless=DOES.get(found.word, "undecided"))
 
     def entries(
         self, seen_m: float | None = None, beside: Sequence[str] = (), ripple_N: float | None = None

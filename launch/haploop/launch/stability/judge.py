@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from haploop.controller.controller import Controller
-from haploop.controller.dissipation import Element, ElementError
+from haploop.controller.dissipation import Element
 from haploop.launch.scene.events import scene_events
+from haploop.launch.stability.causes import with_causes
 from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.looks import (
     BESIDE,
@@ -18,19 +19,14 @@ from haploop.launch.stability.looks import (
     LOOKS_S,
     PATIENT_S,
     SMALLER,
-    failed,
-    findings,
     has_friction,
     is_struck,
-    left_limit,
     moved_beside,
     parts,
     push_of,
-    watch_times,
 )
-from haploop.launch.stability.memory_drift import may_act
 from haploop.launch.stability.still_hand import End, StillHand, deeper_holds, harder_hold, hold_of
-from haploop.launch.stability.swing import REST_M
+from haploop.launch.stability.watch import watch
 from haploop.logger.summary import Summary, finite, write_summary
 from haploop.logger.verdict.measures import window_span
 from haploop.logger.verdict.window import keep_steps
@@ -49,6 +45,7 @@ def judge_scene(
     *,
     blows: Sequence[float] = BLOWS,
     thorough: bool = False,
+    causes: bool = False,
     on_exchange: Callable[[], object] = lambda: None,
 ) -> Finding:
     """Runs a resolved scene to its end and judges that end.
@@ -60,6 +57,7 @@ def judge_scene(
         looks_s: times since the push at which the loop is looked at until it tells.
         blows: what one that rests is struck with, as shares of its push.
         thorough: whether one that rests is tried without its friction and elsewhere within an encoder's count, too.
+        causes: whether one that swings is tried without its delay, counts and elements.
         on_exchange: called whenever the plant asks for commands.
 
     Raises:
@@ -67,7 +65,10 @@ def judge_scene(
         ArithmeticError: the plant's arithmetic failed.
     """
     end = end_of(scene, kinds, events, on_exchange)
-    return judge(end, looks_s, blows=blows, thorough=thorough) if isinstance(end, End) else end
+    if not isinstance(end, End):
+        return end
+    found = judge(end, looks_s, blows=blows, thorough=thorough)
+    return with_causes(end, found) if causes else found
 
 
 def end_of(
@@ -167,14 +168,14 @@ def judge(
     """
     push_N = push_of(end.hold_N, end.scene.hand, end.wall_m)
     pushes_N = push_N * SMALLER, push_N
-    found, x = _watched(end, pushes_N, looks_s)
+    found, x = watch(end, pushes_N, looks_s)
     if found.word == "limit-cycle":
         beside = StillHand(end, push_N * (1.0 + BESIDE))
         beside.go_to(found.watched_s)
         return replace(found, chaotic=parts(x, beside.x, found.width_m))
     for blow in blows:
         if is_struck(found):
-            found = found.after_blow(_watched(end, (push_N * blow,), looks_s)[0])
+            found = found.after_blow(watch(end, (push_N * blow,), looks_s)[0])
     harder_N = None
     if found.word == "steady":
         harder_N = harder_hold(end.scene, end.time, end.plant.reached, end.hold_N, end.wall_m)
@@ -187,39 +188,10 @@ def _elsewhere(end: End, pushes_N: tuple[float, ...], found: Finding) -> Finding
     """Returns the finding of a loop that rests with what it does without its friction, and elsewhere within a count."""
     if end.scene.friction:
         rubs, end = has_friction(end.scene), replace(end, scene=replace(end.scene, friction=Friction(kinetic=0.0)))
-        found = found.without_friction(_watched(end, pushes_N, LOOKS_S)[0]) if rubs else found
+        found = found.without_friction(watch(end, pushes_N, LOOKS_S)[0]) if rubs else found
     for hold_N in deeper_holds(end.scene, end.controller.params.wall, end.hold_N):
         if found.rests_freely:
             push_N = push_of(hold_N, end.scene.hand, end.wall_m)
-            there = _watched(replace(end, hold_N=hold_N), (push_N * SMALLER, push_N), LOOKS_S)[0]
+            there = watch(replace(end, hold_N=hold_N), (push_N * SMALLER, push_N), LOOKS_S)[0]
             found = found.held_deeper(hold_N - end.hold_N, there)
     return found
-
-
-def _watched(end: End, pushes_N: tuple[float, ...], looks_s: Sequence[float]) -> tuple[Finding, np.ndarray]:
-    """Watches a copy for each push, the hardest last, until they tell; returns what, and the last one's positions."""
-    copies = [StillHand(end, push_N) for push_N in pushes_N]
-    wall, push_N = end.controller.params.wall, pushes_N[-1]
-    delay_steps = end.plant.checkpoint().delay_steps
-    times_s = watch_times(end.time, end.time.delay_steps if delay_steps is None else delay_steps, looks_s)
-    found = failed(push_N, 0.0, "")
-    for seconds in times_s:
-        try:
-            for copy in copies:
-                copy.go_to(seconds)
-        except (ArithmeticError, ElementError) as error:
-            found = failed(push_N, seconds, str(error))
-            break
-        gone = [copy.x for copy in copies if copy.stop_reason]
-        if gone:
-            found = left_limit(push_N, seconds, wall, min(gone, key=len))
-            break
-        pushed = [each[None] for each in (copies[0].x, copies[-1].x, copies[-1].command)]
-        last = seconds == times_s[-1]
-        [found] = findings(pushed, end.time, wall, [end.scene], np.array([push_N]), last=last)
-        if found.word == "steady":
-            acts = may_act(copies[-1].memory(), found.width_m >= REST_M, seconds, last=last)
-            found = replace(found, memory_drifts=bool(acts))
-        if found.tells:
-            break
-    return found, copies[-1].x

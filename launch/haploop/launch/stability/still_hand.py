@@ -69,7 +69,7 @@ class StillHand:
 
     def __init__(self, end: End, push_N: float) -> None:
         self._time, self._rate = replace(end.time, ticks=2**53), end.time.control_rate
-        self._plant = _went_on(held(end.scene, end.hold_N + push_N), self._time, end.plant)
+        self._plant = continue_plant(held(end.scene, end.hold_N + push_N), self._time, end.plant)
         self._controller = end.controller.fork()
         self._first, self._steps = end.plant.reached + push_ticks(self._rate), end.time.steps_per_tick
         self._then: Scene | None = held(end.scene, end.hold_N)
@@ -92,7 +92,7 @@ class StillHand:
             self._run_until(self._first)
             if self.stop_reason:
                 return
-            self._plant, self._then = _went_on(self._then, self._time, self._plant), None
+            self._plant, self._then = continue_plant(self._then, self._time, self._plant), None
             self.x, self.command = np.zeros(0), np.zeros(0)
         begun, end = len(self.x), round(seconds * self._rate)
         for tick in look_ticks(begun, end) if memory_of(self._controller).size else [end]:
@@ -131,7 +131,7 @@ def held(scene: Scene, force_N: float) -> Scene:
     return replace(scene, hand=hand, event=(), noise=None, accelerometer=sensor)
 
 
-def _went_on(scene: Scene, time: Timebase, plant: Plant) -> Plant:
+def continue_plant(scene: Scene, time: Timebase, plant: Plant) -> Plant:
     """Returns a plant of the scene that goes on from where another one is."""
     other = Plant(scene, time)
     other.restore(deepcopy(plant.checkpoint()))

@@ -156,7 +156,7 @@ def judge(directory: Directory, json: Json = False) -> None:
             with unheard():
                 scene, kinds, events = repeatable(directory, recorded)
                 demand_own(recorded, scene)
-                finding = judge_scene(scene, kinds, events, thorough=True)
+                finding = judge_scene(scene, kinds, events, thorough=True, causes=True)
         except ReplayError as error:
             leave(str(error), WRONG_USE)
     if json:

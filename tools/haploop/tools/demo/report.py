@@ -25,7 +25,7 @@ def report(story: Story) -> RenderableType:
         )
     return Group(
         Text(story.data.scene.title, style="bold"),
-        Text(f"\nWhy: {story.why()}"),
+        Text(f"\n{story.why()}"),
         Text(f"\nAt {story.at_s:g} s, in mid-contact, {story.element} is swapped in. {story.outcome()}"),
         table,
         *(

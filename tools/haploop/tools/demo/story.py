@@ -15,7 +15,7 @@ from haploop.logger.summary import Summary
 from haploop.logger.verdict.measures import WINDOW_S
 from haploop.protocol.scene.scene import ElementTable
 from haploop.tools.figure.data import RunData
-from haploop.tools.render.cause import cause
+from haploop.tools.render.cause import by_trial, cause
 from haploop.tools.render.units import amount
 
 # By whether the loop is steady before and after the swap.
@@ -88,8 +88,10 @@ class Story:
         return ("before", self.before), ("after", self.after)
 
     def why(self) -> str:
-        """Returns where the swing before the swap has its energy from, as a sentence."""
-        return cause(self.before.summary["energy"], f"Up to {self.at_s:g} s")
+        """Returns the likely cause of the swing before the swap, and where its energy is from, as sentences."""
+        tried = by_trial(self.before.summary["stability"].get("without"))
+        books = cause(self.before.summary["energy"], f"Up to {self.at_s:g} s")
+        return f"Likely cause: {tried} {books}" if tried else books
 
     def outcome(self) -> str:
         """Returns what the swap did, as a sentence."""
@@ -112,7 +114,7 @@ def tell(spec: RunSpec) -> Story:
     after = start.run(spec)
     if after["ended"] != "done":
         raise RunFailed(f"The run was not brought to its end: {after['ended']}.")
-    before = run_in_process(replace(spec.scene, event=(), duration=event.at), spec.kinds)
+    before = run_in_process(replace(spec.scene, event=(), duration=event.at), spec.kinds, causes=True)
     data = RunData.from_directory(spec.out)
     parts = _part(before, data, event.at), _part(after, data, data.span_s[1])
     return Story(data, event.at, _named(event.swap, spec.kinds[event.swap.name]), *parts)

@@ -1,4 +1,4 @@
-"""Likely cause of a swing, as a sentence: what gave the device the most energy, by the books of a run."""
+"""Likely cause of a swing, as sentences: the part without which the loop rests, and where the energy comes from."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from haploop.tools.render.units import amount
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from haploop.logger.summary import Summary
 
 # Verdicts of a loop that swings.
@@ -22,12 +24,20 @@ _NOTHING = "{when} the wall moved no energy at all: what moves here is not fed b
 _WALL = (
     "{when} the wall gave the device {energy} more than an ideal one would have, {share:.0f} % of it because {because}."
 )
-# A linear loop without counts has no swing of a width of its own: it dies, or grows.
-_MOST_COUNTS = 2.0
-_COUNTS = (
-    "the encoder: it swings by {counts:.2g} of its counts. A swing within two comes of them as a rule, whatever feeds "
-    "it; the same scene with a finer encoder tells. "
-)
+# Parts that a judged loop is tried without: the part, and the loop without it.
+_PARTS = {
+    "delay": ("the delay", "without its delay"),
+    "encoder": ("the encoder's counts", "with an encoder 1000 times as fine"),
+    "elements": ("the dissipation elements", "without its elements"),
+    "all": ("", "without all of these"),
+}
+_DOES = {"rests": "rests {}", "swings on": "swings on {}", "undecided": "is undecided {}"}
+_SEVERAL = "{} together, since it rests without any one of them"
+_NO_SINGLE_ONE = "no single part, since it swings on without any one of them"
+_THE_REST = "the hold of each force over a tick, or what else the scene simulates"
+_UNTOLD = "not told by these trials"
+_TRIED = "{cause}. Continued from the end of the run, the loop {trials}."
+_BY_BOOKS = "By the books of the whole run"
 # The books of wall and elements are those of the commands, and the actuator has one of its own.
 _LIMITED = " That is by what was commanded: the actuator's limits kept {kept} of it back."
 _KEPT = 0.1
@@ -35,13 +45,32 @@ _ELEMENT = "{when} {element} gave the device {energy}, more than the wall did."
 
 
 def likely_cause(summary: Summary) -> str:
-    """Returns what a swing comes of, given the summary of its run: the encoder where it is within two of its counts.
+    """Returns the likely cause of a swing, given the summary of its run; "" where nothing is known of it.
 
-    Beside that, or alone, stands where its energy is from; "" of books without a wall.
+    Where the loop was tried without its parts, it is the part without which it rests, followed by the trials. The
+    energy by the books, ``cause``, comes after it: one part may feed a swing that rests without another.
     """
-    counts = summary.get("stability", {}).get("counts")
-    of_counts = _COUNTS.format(counts=counts) if counts and counts < _MOST_COUNTS else ""
-    return (of_counts + cause(summary["energy"])).rstrip()
+    tried = by_trial(summary.get("stability", {}).get("without"))
+    books = cause(summary["energy"], _BY_BOOKS) if tried else cause(summary["energy"])
+    return f"{tried} {books}".strip()
+
+
+def by_trial(without: Mapping[str, str] | None) -> str:
+    """Returns the likely cause and its trials, given ``without`` of a summary's ``stability``; "" without trials."""
+    if not without:
+        return ""
+    tried = [_DOES[does].format(_PARTS[name][1]) for name, does in without.items()]
+    trials = " and ".join(filter(None, [", ".join(tried[:-1]), tried[-1]]))
+    return _TRIED.format(cause=_cause_by_trial(without), trials=trials)
+
+
+def _cause_by_trial(without: Mapping[str, str]) -> str:
+    if rests := [_PARTS[name][0] for name, does in without.items() if does == "rests" and name != "all"]:
+        parts = " and ".join(rests)
+        return _SEVERAL.format(parts) if len(rests) > 1 else parts
+    if "undecided" in without.values():
+        return _UNTOLD
+    return _NO_SINGLE_ONE if without.get("all") == "rests" else _THE_REST
 
 
 def cause(energy: Summary, when: str = "In all") -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from haploop.launch.foreign import described
 from haploop.launch.scene.mistakes import counted
-from haploop.tools.render.cause import SWINGS, likely_cause
+from haploop.tools.render.cause import SWINGS, by_trial, likely_cause
 from haploop.tools.render.terminal import console, make_facts, make_table, told, verdict_style
 from haploop.tools.render.units import amount, fixed, parameters, spring
 
@@ -204,6 +204,8 @@ def finding_table(finding: Finding) -> RenderableType:
     found = finding.entries()["stability"]
     head = Text.assemble((finding.word, verdict_style(finding.word)), (_provisos(found), "bold yellow"))
     parts: list[RenderableType] = [head, Text(finding.sentence())]
+    if tried := by_trial(finding.without):
+        parts.append(Text(f"Likely cause: {tried}"))
     if rows := _stability(found):
         parts.append(make_facts(rows))
     return Group(*parts)

@@ -1,0 +1,72 @@
+"""Causes of a swing by trial: the loop continues from the end of its run without its delay, counts or elements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import reduce
+
+from haploop.launch.stability.finding import DOES, Finding
+from haploop.launch.stability.looks import LOOKS_S, SMALLER, push_of
+from haploop.launch.stability.still_hand import End, continue_plant
+from haploop.launch.stability.watch import watch
+from haploop.protocol.ticks import DELAY
+
+# An encoder so many times as fine has no counts that a hand could feel.
+FINER = 1000.0
+# A trial that does not tell by then is undecided.
+_LOOKS_S = LOOKS_S
+ALL = "all"
+
+
+def with_causes(end: End, found: Finding) -> Finding:
+    """Returns the finding of a loop that swings with what the loop does without each of its parts.
+
+    The swing goes on from the end of the run; one part is taken out, the hand is held and pushed as for the verdict,
+    and the loop is watched for up to 4 s. Parts are the round-trip delay, the counts of the encoder (made ``FINER``
+    times as fine) and the dissipation elements. Where the loop swings on without any one of several, it is tried
+    without all of them. What then is left is the hold of each force over a tick, and what else the scene simulates.
+    """
+    if found.word not in ("limit-cycle", "growing"):
+        return found
+    trials = {name: without for name, (has, without) in _PARTS.items() if has(end)}
+    does = {name: _does(without(end)) for name, without in trials.items()}
+    if len(does) > 1 and "rests" not in does.values():
+        does[ALL] = _does(reduce(lambda so_far, without: without(so_far), trials.values(), end))
+    return replace(found, without=does)
+
+
+def _does(end: End) -> str:
+    push_N = push_of(end.hold_N, end.scene.hand, end.wall_m)
+    return DOES.get(watch(end, (push_N * SMALLER, push_N), _LOOKS_S)[0].word, "undecided")
+
+
+def _delay_steps(end: End) -> int:
+    changed = end.plant.checkpoint().delay_steps
+    return end.time.delay_steps if changed is None else changed
+
+
+def _without_delay(end: End) -> End:
+    """Returns the end with a line without delay; commands already on the line still arrive."""
+    plant = continue_plant(end.scene, end.time, end.plant)
+    plant.schedule(plant.tick, {"set": {DELAY: 0.0}})
+    return replace(end, plant=plant)
+
+
+def _with_fine_counts(end: End) -> End:
+    assert end.scene.encoder
+    fine = replace(end.scene.encoder, resolution=end.scene.encoder.resolution / FINER)
+    return replace(end, scene=replace(end.scene, encoder=fine))
+
+
+def _without_elements(end: End) -> End:
+    state = end.controller.state
+    params = replace(end.controller.params, elements=())
+    return replace(end, controller=end.controller.fork(params, state and (*state[:3], ())))
+
+
+_PARTS: dict[str, tuple[Callable[[End], bool], Callable[[End], End]]] = {
+    "delay": (lambda end: _delay_steps(end) > 0, _without_delay),
+    "encoder": (lambda end: end.scene.encoder is not None, _with_fine_counts),
+    "elements": (lambda end: bool(end.controller.params.elements), _without_elements),
+}
