@@ -1,1 +1,1 @@
-"""The common ground of all processes: scene, changes, simulated time, numbers and trees; ``transport`` joins them."""
+"""What all processes share: scene, changes, simulated time, numbers and trees; ``transport`` connects them."""

@@ -1,4 +1,4 @@
-"""Choice and rounding, written once for floats of one run and for arrays over the members of a batch (last axis)."""
+"""Selection and rounding, written once for floats of one run and for arrays over a batch's members (last axis)."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def root(value: Any) -> Any:
 
 
 def nearest_multiple(value: Any, unit: Any) -> Any:
-    """Returns ``unit * rint(value / unit)``; a value without a finite count of units (infinite, NaN) stays."""
+    """Returns ``unit * rint(value / unit)``; unchanged if that quotient is not finite (infinite, NaN)."""
     counts = value / unit
     if counts.__class__ is float:
         return unit * float(round(counts)) if counts - counts == 0.0 else value
@@ -55,10 +55,10 @@ def clipped(value: Any, most: Any) -> Any:
 
 
 def each(function: Callable[..., Any], *numbers: Any) -> Any:
-    """Returns ``function`` of these numbers; where some are arrays, of those of every member by themselves.
+    """Returns ``function`` of these numbers; where some are arrays, evaluates it for every member separately.
 
-    So the coefficients of a batch come from the same code as those of one run, to the same bits. For equal numbers the
-    function is called once.
+    Thus the coefficients of a batch come from the same code as those of one run, to the same bits. For members with
+    equal numbers the function is called once.
 
     Args:
         function: from floats to a float, an array, or a tuple of these.
@@ -80,7 +80,7 @@ def each(function: Callable[..., Any], *numbers: Any) -> Any:
 
 
 def rows_of(values: Sequence[Any], members: int) -> np.ndarray:
-    """Returns one row for each value, a number for all members or an array over them; shape (rows, members)."""
+    """Returns one row for each value (a number for all members, or an array over them); shape (rows, members)."""
     import numpy as np
 
     rows = np.empty((len(values), members))

@@ -1,9 +1,9 @@
-"""The events of a run and the one meaning of a change: what a swap or a set does to a scene, from which tick on.
+"""The events of a run and the single meaning of a change: what a swap or a set does to a scene, and from which tick on.
 
-An event is a map, as ``[[event]]`` of a scene, GRANT and the log's ``/events`` hold it. Some events change what is
-simulated: ``swap`` (an element comes, goes or takes another's place) and ``set`` (values of wall, delay or elements).
+An event is a map, in the form that a scene's ``[[event]]``, GRANT and the log's ``/events`` hold. Two events change
+what is simulated: ``swap`` (adds, removes or replaces an element) and ``set`` (sets values of wall, delay or elements).
 The others (pause, resume, step, pace, stop, refused, restored) change no bit of it: a controller that takes a swap
-back, since the new element raised, has done so by itself before the event tells of it.
+back because the new element raised an error has already done so by itself when the event reports it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from haploop.protocol.scene.scene import NO_ELEMENT, ElementTable, Scene
 Event = dict[str, Any]
 
 KINDS = ("swap", "set", "pause", "resume", "step", "stop", "pace", "refused", "restored")
-# What the status of a PROGRESS tells of changes that were not made, or were taken back.
+# Keys in the status of a PROGRESS that report changes which were not made, or were taken back.
 REFUSALS = ("refused", "refused_changes", "restored")
 _NO_UNITS: Mapping[str, str] = {}
 
@@ -31,12 +31,12 @@ class Change:
 
     Attributes:
         tick: the first tick that sees the change.
-        swap: the element that comes; one of the name ``NO_ELEMENT`` takes one out. None for a set.
+        swap: the new element; one named ``NO_ELEMENT`` removes an element. None for a set.
         element: place in the list of elements, counted from 0; one past the end adds an element.
         set: dotted key -> value in SI units.
-        plugin: path of a file that defines the element, loaded first; None for none.
-        refused: why it could not be carried out, a full sentence; None where it was.
-        on_record: tick of the event that tells of it, where that is a later one: of a swap taken back.
+        plugin: path of a file that defines the element, loaded first; None if there is none.
+        refused: why the change could not be carried out, as a full sentence; None if it was carried out.
+        on_record: tick of the event that reports the change, if that is a later one, as when a swap is taken back.
     """
 
     tick: int
@@ -68,9 +68,9 @@ class Change:
         return {"tick": self.tick, **content, **{key: value for key, value in extra.items() if value is not None}}
 
     def apply(self, scene: Scene) -> Scene:
-        """Returns the scene with the change made, or as it is where the change was refused.
+        """Returns the scene with the change made, or unchanged if the change was refused.
 
-        What the change leaves alone is shared with ``scene``: an element that stays is the same object.
+        What the change does not affect is shared with ``scene``: an element that stays is the same object.
         """
         if self.refused is not None:
             return scene
@@ -83,7 +83,7 @@ class Change:
         return scene
 
     def singly(self) -> Iterator[Change]:
-        """Yields the change value by value: each set of an element's parameter opens a book of its own."""
+        """Yields the change value by value: each set of an element's parameter opens a separate book."""
         if self.swap is not None or len(self.set) < 2:
             yield self
             return
@@ -94,7 +94,7 @@ class Change:
         """Returns the change in a few words, such as ``element 0 becomes damping (damping 0.8 N s/m)``.
 
         Args:
-            units: unit by settable key, and by kind and parameter (``damping.damping``); a number without is bare.
+            units: unit by settable key, and by kind and parameter (``damping.damping``); others are written without.
         """
         if self.swap is None:
             return "set " + ", ".join(f"{key} = {_amount(value, units.get(key))}" for key, value in self.set.items())
@@ -107,20 +107,20 @@ class Change:
         return f"element {self.element} becomes {kind}" + (f" ({', '.join(words)})" if words else "")
 
     def is_as(self, other: Change | None) -> bool:
-        """Tells whether another is the same change, whatever became of it."""
+        """Tells whether another change is the same, apart from its plugin file and from whether it was refused."""
         return other is not None and replace(self, plugin=None, refused=None) == replace(
             other, plugin=None, refused=None
         )
 
     def refuse(self, error: BaseException, place: str = "") -> Change:
-        """Returns the change as one that could not be carried out, ``place`` being where in a file the error rose."""
+        """Returns the change as one that could not be carried out; ``place`` says where in a file the error arose."""
         why = f"{type(error).__name__}: {error}{place}"
         return replace(self, refused=f"The change at tick {self.tick}, {self.describe()}, was refused: {why}")
 
 
 @dataclass(frozen=True)
 class Span:
-    """A scene as it was at work from a tick on and up to another, which is infinite for the last span."""
+    """The scene at work from one tick up to another, which is infinite for the last span."""
 
     from_tick: int
     to_tick: float
@@ -128,7 +128,7 @@ class Span:
 
 
 def is_change(event: Event) -> bool:
-    """Returns whether an event changes what is simulated."""
+    """Tells whether an event changes what is simulated."""
     return "swap" in event or "set" in event
 
 
@@ -138,7 +138,7 @@ def refusal(change: Change) -> Event:
 
 
 def refusals_as_status(refused: Iterable[Change], restored: Sequence[Event] = ()) -> Event | None:
-    """Returns what the controller's PROGRESS reports of changes refused and taken back; None where there are none."""
+    """Returns the controller's PROGRESS status for changes refused and taken back; None if there are none."""
     events = [refusal(change) for change in refused]
     named = {"refused": "refused", "refused_changes": "change"}
     status = {key: [event[name] for event in events] for key, name in named.items()} if events else {}
@@ -146,16 +146,16 @@ def refusals_as_status(refused: Iterable[Change], restored: Sequence[Event] = ()
 
 
 def restoration(change: Change, why: str, since: int | None = None, plugin: str | None = None) -> Event:
-    """Returns the event that tells of a swap that was taken back: what took its place, from which tick on, and why.
+    """Returns the event that reports that a swap was taken back: what took its place, from which tick on, and why.
 
-    ``since`` is the tick of that swap and ``plugin`` the file that came with it, which is taken back, too.
+    ``since`` is the tick of that swap and ``plugin`` the file that came with it, which is taken back too.
     """
     code = {} if plugin is None else {"code": {"tick": since, "plugin": plugin}}
     return {"restored": why, "change": change.as_dict()} | code
 
 
 def is_off(tick: int, event: Event, events: Sequence[tuple[int, Event]]) -> bool:
-    """Tells whether a change that came with a plugin was refused or taken back, by the events of its run."""
+    """Tells from the events of a run whether a change that came with a plugin was refused or taken back."""
     change, code = Change.from_dict(tick, event), {"tick": tick, "plugin": event["plugin"]}
     refused = (refused_change(other) for _, other in events if "refused" in other)
     return any(other.get("code") == code for _, other in events) or any(
@@ -164,7 +164,7 @@ def is_off(tick: int, event: Event, events: Sequence[tuple[int, Event]]) -> bool
 
 
 def refused_change(event: Event) -> Change | None:
-    """Returns the change that a refusal, or the taking back of a swap, names; None where it names none."""
+    """Returns the change that is named by a refusal, or by the taking back of a swap; None if it names none."""
     try:
         return Change.from_dict(
             int(event["change"]["tick"]), {**event["change"], "set": dict(event["change"].get("set", {}))}
@@ -174,9 +174,9 @@ def refused_change(event: Event) -> Change | None:
 
 
 def refusals_of(status: Event, events: Iterable[tuple[int, Event]] = ()) -> list[Event]:
-    """Returns the events that put on record what a PROGRESS reported, which need not tell the changes themselves.
+    """Returns the events that put on record what a PROGRESS reported; the report need not name the changes themselves.
 
-    What is no refusal is left out, as are refusals of changes that ``events``, (tick, event), hold already.
+    What is not a refusal is left out, and so are refusals that are already among ``events``, (tick, event).
     """
     sentences, changes = status.get("refused"), status.get("refused_changes")
     known = [refused_change(event) for _, event in events if "refused" in event]
@@ -200,7 +200,7 @@ def refusals_of(status: Event, events: Iterable[tuple[int, Event]] = ()) -> list
 
 
 def changes_of(events: Iterable[tuple[int, Event]]) -> list[Change]:
-    """Returns the changes among (tick, event) in order, with ``refused`` where a later event refuses one."""
+    """Returns the changes among (tick, event) in order, with ``refused`` set where a later event refuses one."""
     events = list(events)
     refusals = [event for _, event in events if "refused" in event]
     changes: list[Change] = []
@@ -218,7 +218,7 @@ def changes_of(events: Iterable[tuple[int, Event]]) -> list[Change]:
 
 
 def spans(scene: Scene, changes: Iterable[Change]) -> list[Span]:
-    """Returns what was at work from when to when, in order: a span for the start and one for each change made."""
+    """Returns which scene was at work from when to when, in order: a span for the start and one per change made."""
     made = [change for change in changes if change.refused is None]
     ends = [*(change.tick for change in made), math.inf]
     found = [Span(0, ends[0], scene)]
@@ -228,7 +228,7 @@ def spans(scene: Scene, changes: Iterable[Change]) -> list[Span]:
 
 
 def happened_at(tick: int, event: Event) -> int:
-    """Returns the tick at which an event on record at a tick took effect: earlier for a swap that was taken back."""
+    """Returns the tick at which an event recorded at a tick took effect: an earlier one if a swap was taken back."""
     taken_back = refused_change(event) if "restored" in event else None
     return taken_back.tick if taken_back else tick
 

@@ -53,7 +53,7 @@ def _markdown(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 def with_tables(text: str) -> str:
     """Returns ``text`` with everything between the two marker comments replaced by ``table()``.
 
-    Raises ValueError where the markers are not there, once each and in order.
+    Raises ValueError unless each marker is there once, and in order.
     """
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)

@@ -1,4 +1,4 @@
-"""Reading of files that somebody names: regular ones alone, up to a size, with an OSError in words for all others."""
+"""Reading of files that somebody names: only regular files up to a size; for others an OSError says why in words."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 import stat
 from pathlib import Path
 
-# A file of text that is larger is none that a person or a run of this program has written.
+# No text file that a person or a run of this program has written is larger than this.
 _MOST_BYTES = 1 << 26
 
 
@@ -15,7 +15,7 @@ def demand_regular(path: str | Path) -> os.stat_result:
     """Returns size and times of a file that can be read to its end.
 
     Raises:
-        OSError: there is none, or it is a directory, a pipe or a device; ``strerror`` says so in words.
+        OSError: there is no such file, or it is a directory, a pipe or a device; ``strerror`` says so in words.
     """
     try:
         found = Path(path).stat()
@@ -29,7 +29,7 @@ def demand_regular(path: str | Path) -> os.stat_result:
 
 
 def read_file(path: str | Path, most_bytes: int = _MOST_BYTES) -> bytes:
-    """Returns the content of a file; OSError as of ``demand_regular``, or where it is longer than ``most_bytes``."""
+    """Returns a file's content; raises OSError as ``demand_regular`` does, or if it is longer than ``most_bytes``."""
     size = demand_regular(path).st_size
     if size > most_bytes:
         raise OSError(errno.EFBIG, f"It has {size} bytes, and {most_bytes} at most were expected", str(path))
@@ -37,10 +37,10 @@ def read_file(path: str | Path, most_bytes: int = _MOST_BYTES) -> bytes:
 
 
 def line_of(error: UnicodeDecodeError) -> int:
-    """Returns the line, from 1, of the byte that is no UTF-8 in what was read whole."""
+    """Returns the line, counted from 1, of the byte that is not UTF-8; the file must have been decoded as a whole."""
     return error.object.count(b"\n", 0, error.start) + 1
 
 
 def read_text(path: str | Path) -> str:
-    """Returns a file's UTF-8 text, without a byte order mark; OSError as of ``read_file``, or UnicodeDecodeError."""
+    """Returns a file's UTF-8 text without a byte order mark; raises OSError as ``read_file``, or UnicodeDecodeError."""
     return read_file(path).decode("utf-8-sig")

@@ -1,4 +1,4 @@
-"""Classes that a scene may name beside haploop's own: of installed packages, by entry points, and of plugin files."""
+"""Classes that a scene may name besides haploop's own: from installed packages, by entry points, and plugin files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def loaded(entry: EntryPoint) -> Any:
     """Returns what an entry point names.
 
     Raises:
-        PluginError: it cannot be imported; the message has its name, its group and where it should be.
+        PluginError: it cannot be imported; the message gives its name, its group and where it should be.
     """
     try:
         return entry.load()
@@ -48,7 +48,7 @@ def entry_points_of(group: str) -> EntryPoints:
 
 @cache
 def _all() -> Any:
-    """Every entry point; looked for once, since that reads a file of each package there is."""
+    """Returns every entry point; looks them up once, since that reads a file of every installed package."""
     from importlib.metadata import entry_points
 
     return entry_points()
@@ -60,18 +60,18 @@ def brought(group: str) -> Mapping[str, type]:
 
 
 def all_brought() -> Brought:
-    """Returns the classes of every group, for ``bring`` to make the same known again."""
+    """Returns the classes that files have brought, of every group, so that ``bring`` can make them known again."""
     return {group: dict(classes) for group, classes in _brought.items()}
 
 
 def sources_brought() -> tuple[tuple[str, str], ...]:
-    """Returns text and name of the files that brought what is known, for other processes."""
+    """Returns text and name of the files that brought the classes known here, for other processes."""
     known = [made for classes in _brought.values() for made in classes.values()]
     return tuple(dict.fromkeys(_sources[made] for made in known if made in _sources))
 
 
 def bring(classes: Brought, source: tuple[str, str] | None = None) -> None:
-    """Makes classes known to this process by group and name; one of a name that is known takes its place."""
+    """Makes classes known to this process by group and name; a new class replaces a known one of the same name."""
     for group, named in classes.items():
         if any(_brought.get(group, {}).get(name) is not made for name, made in named.items()):
             _brought.setdefault(group, {}).update(named)
@@ -93,7 +93,7 @@ def forget() -> None:
 
 
 def cached_until_brought(function: Cached) -> Cached:
-    """Keeps what a function returns, as ``functools.cache``, until a file brings something it may depend on."""
+    """Caches what a function returns, as ``functools.cache`` does, until a file brings something it may depend on."""
     kept: Any = cache(function)
     _caches.append(kept.cache_clear)
     return kept

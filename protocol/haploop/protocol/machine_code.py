@@ -17,20 +17,20 @@ from shutil import rmtree
 from types import FunctionType, ModuleType
 from typing import Any
 
-# How the name of the file begins by which it is known that the machine code beside it is whole.
+# Prefix of the name of the file that marks the machine code beside it as complete.
 MADE = "made-"
-# To compile takes 16 s, or a minute on a busy machine; a process that was stopped meanwhile holds nobody up for longer.
+# Compiling takes 16 s, or a minute on a busy machine; a process that is stopped meanwhile delays others no longer.
 _PATIENCE_S = 120.0
 
 
 class MachineCode:
-    """A compiler of the functions of a module, which keeps what it made beside that module's file.
+    """A compiler of a module's functions, which keeps the machine code beside that module's file.
 
-    numba by itself looks at the file of a function alone, and would go on with machine code of changed formulas: the
-    directory is that of the very sources of the module and of those whose functions it compiles.
+    numba itself checks only the file of a function, and would continue to use the machine code of formulas that have
+    changed. Here each state of the sources, of the module and of those whose functions it compiles, has a directory.
 
     Attributes:
-        kept: that directory; "" where there is none to write into.
+        kept: that directory; "" if there is none that can be written to.
     """
 
     def __init__(self, file: str, formulas: tuple[ModuleType, ...]) -> None:
@@ -41,11 +41,11 @@ class MachineCode:
             self.kept = str(here / f"{Path(file).stem}-{sha256(b''.join(sources)).hexdigest()[:16]}")
 
     def compiled(self, function: Any, inlined: bool = False, **others: Callable[..., Any]) -> Any:
-        """Returns a function of numbers and arrays as machine code, with IEEE arithmetic as it is written.
+        """Returns a function of numbers and arrays as machine code, with IEEE arithmetic as written.
 
         Args:
-            inlined: whether it is written out where it is called, which spares handing over structures of arrays.
-            others: what it calls by a name of its module, where that is to be something else.
+            inlined: whether it is inlined where it is called, which avoids passing structures of arrays.
+            others: replacements for functions that it calls, by their names in its module.
         """
         import numba.core.config  # pyright: ignore[reportMissingImports]
 
@@ -65,9 +65,9 @@ class MachineCode:
             settings.CACHE_DIR = before
 
     def try_out(self, function: Callable[[], object]) -> None:
-        """Calls a function that compiles the loops, or loads them, and marks what is kept as made.
+        """Calls a function that compiles or loads the loops, and marks the kept machine code as complete.
 
-        Raises whatever numba does; the next process then finds no machine code kept, which may be damaged.
+        Raises whatever numba raises; the kept machine code may be damaged then, so the next process finds none.
         """
         try:
             with self._one_at_a_time():
@@ -81,7 +81,7 @@ class MachineCode:
 
     @contextmanager
     def _one_at_a_time(self) -> Iterator[None]:
-        """Has one process compile where several would, as workers of a sweep; the others load what it made."""
+        """Lets one process compile where several would, such as workers of a sweep; the others load the result."""
         with ExitStack() as held:
             with suppress(OSError, AttributeError):  # without a lock each compiles
                 if self.kept and not self.is_made():
@@ -94,7 +94,7 @@ class MachineCode:
             yield
 
     def is_made(self) -> bool:
-        """Tells whether the loops were compiled before, for this processor, so that to load them is a matter of 1 s."""
+        """Tells whether the loops were compiled before, for this processor, so that loading them takes about 1 s."""
         return bool(self.kept) and self._mark.exists()
 
     @property

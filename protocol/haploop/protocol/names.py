@@ -1,10 +1,10 @@
-"""The name that was meant, where one is given that is none."""
+"""The name that was meant, where an unknown one is given."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-# Less alike than this is another word: "spring" and "damping" are 0.62.
+# Names less alike than this are different words: "spring" and "damping" are 0.62.
 _ALIKE = 0.65
 
 
@@ -16,12 +16,12 @@ def nearest(name: object, allowed: Iterable[str]) -> str | None:
     whole = difflib.get_close_matches(str(name), allowed, n=1, cutoff=_ALIKE)
     if whole or "." in str(name):
         return next(iter(whole), None)
-    # Of a dotted key people name the last part.
+    # Of a dotted key, people name only the last part.
     ends = {one.rpartition(".")[2].lower(): one for one in reversed(allowed) if "." in one}
     return next((ends[end] for end in difflib.get_close_matches(str(name).lower(), ends, n=1, cutoff=_ALIKE)), None)
 
 
 def meant(name: object, allowed: Iterable[str]) -> str:
-    """Returns " (did you mean NAME?)", by the nearest of the allowed names; "" where none is close."""
+    """Returns " (did you mean NAME?)" with the nearest of the allowed names; "" if none is close."""
     found = nearest(name, allowed)
     return f" (did you mean {found}?)" if found else ""

@@ -1,4 +1,4 @@
-"""A file of one's own: run, looked through for what a scene may name, and that made known to this process."""
+"""A user's plugin file: it is run and searched for what a scene may name, which is made known to this process."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from typing import Any
 from haploop.protocol.files import line_of, read_text
 from haploop.protocol.installed import Brought, PluginError, bring
 
-# Elements are handed on from hand to hand, since a swap may change the code of one; all else is known by its name.
+# Elements are passed on explicitly, since a swap may change the code of one; everything else is known by its name.
 ELEMENTS = "haploop.dissipation"
 _MODULE = "haploop_plugin_"
-# A run keeps a copy of each plugin under its name with a digest: people are told the name that they gave.
+# A run keeps a copy of each plugin under its name with a digest; messages show the name that the user gave.
 _KEPT = re.compile(r"-[0-9a-f]{12}(?=\.py$)")
 _NOTHING = (
     "The plugin {} defines nothing that a scene can name; a class derived from Element, Wall, Estimator or HandForce "
@@ -27,10 +27,10 @@ _NOTHING = (
 
 
 def bring_file(path: Path) -> Brought:
-    """Runs a Python file as ``bring_source`` does its text: only a file that the user named comes here.
+    """Runs a Python file as ``bring_source`` runs its text; only a file that the user named is passed to it.
 
     Raises:
-        PluginError: the file cannot be read, too.
+        PluginError: as there, or the file cannot be read.
     """
     try:
         source = read_text(path)
@@ -45,9 +45,9 @@ def bring_file(path: Path) -> Brought:
 def bring_source(source: str, origin: str) -> Brought:
     """Runs the text of a Python file; returns the classes that a scene may name, by group of entry points and name.
 
-    A class is what its base is: the base says its group, and which attribute is its name. All but elements are known
-    to this process from then on. ``origin`` is the file. Its ``print`` writes to stderr, now and later, since stdout
-    belongs to the answers of commands.
+    The base of a class decides what it is: it gives the group, and the attribute that holds the name. All classes but
+    elements are known to this process from then on. ``origin`` is the file. Its ``print`` writes to stderr, now and
+    later, since stdout is for the answers of commands.
 
     Raises:
         PluginError: the text cannot be run, or defines no usable class.
@@ -60,7 +60,7 @@ def bring_source(source: str, origin: str) -> Brought:
         kind: Any = made
         name = getattr(kind, kind.named_by, None)
         place = f"The class {kind.__name__} in {origin}{_line_of(source, kind)}"
-        if kind.group != ELEMENTS:  # whose own register says what is wrong with one
+        if kind.group != ELEMENTS:  # the register of elements itself says what is wrong with one
             if not isinstance(name, str) or not name:
                 raise PluginError(f'{place} names no {kind.named_by}; write {kind.named_by} = "my-own" in the class.')
             if lacks := sorted(getattr(kind, "__abstractmethods__", ())):
@@ -117,7 +117,7 @@ def told_name(file: str) -> str:
 
 
 def raised_in_file(error: BaseException) -> str:
-    """Returns what code of a plugin file raised, with the file and the line; "" where none of it had a part in it."""
+    """Returns an error's text with the plugin file and line that it came through; "" if it came through none."""
     trace, place = error.__traceback__, ""
     while trace:
         frame = trace.tb_frame

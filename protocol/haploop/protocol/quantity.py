@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-# Bounds of what can be meant, by unit: the largest size to either side, what that is like, and the least of what must
-# be above 0. Beyond them products overflow; what declares bounds of its own has those.
+# Bounds of what can be meant, by unit: the largest magnitude in either direction, what that compares to, and the least
+# value of what must be above 0. Beyond them products overflow; a quantity that declares its own bounds has those.
 MEANT: Mapping[str, tuple[float, str, float]] = {
     "s": (1e9, "thirty years", 1e-9),
     "m": (1e6, "a thousand kilometres", 1e-15),
@@ -37,8 +37,8 @@ class Quantity:
         at_least, above, at_most, below: bounds, each optional; those of ``MEANT`` stand in for the ones left out.
         about: the meaning of the number in a few words, for editors.
         whole: only whole numbers, held as int.
-        choices: all the values there are, texts or False and True, of what is no number; empty of one that is.
-        step: only multiples of it.
+        choices: all allowed values, texts or False and True, if it is not a number; empty if it is one.
+        step: only multiples of this are allowed.
     """
 
     unit: str
@@ -57,7 +57,7 @@ class Quantity:
         return {name: getattr(self, name) for name in names} | ({"choices": [*self.choices]} if self.choices else {})
 
     def text(self, value: Any) -> str:
-        """Returns a value with its unit, a choice as a scene file has it."""
+        """Returns a value with its unit, or a choice as a scene file writes it."""
         return json.dumps(value) if self.choices else f"{value:g} {self.unit}".rstrip()
 
     def complaint(self, value: float) -> str | None:

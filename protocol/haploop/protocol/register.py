@@ -12,7 +12,7 @@ Kind = TypeVar("Kind")
 
 
 class UnknownKind(KeyError):
-    """A kind that a scene names and that is not at hand; the message says what to do."""
+    """Raised for a kind that a scene names but that is not available; the message says what to do."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -22,9 +22,9 @@ class Register(Generic[Kind]):
     """Walls, estimators or hand forces by name: those of haploop, of installed packages and of plugin files.
 
     Args:
-        what: one of them is, in words.
-        group: of the entry points by which packages name theirs.
-        own: those of haploop: the class, or "module:class", which is imported where it is used.
+        what: what one of them is called in messages.
+        group: group of the entry points by which packages name theirs.
+        own: haploop's own by name: the class, or "module:class", which is imported when it is used.
     """
 
     def __init__(self, what: str, group: str, own: Mapping[str, str | type[Kind]]) -> None:
@@ -36,10 +36,10 @@ class Register(Generic[Kind]):
         return tuple({**self._own, **dict.fromkeys(entry_points_of(self.group).names), **brought(self.group)})
 
     def find(self, name: str) -> type[Kind]:
-        """Returns the class of a name; its module is imported here. One of a file wins over others.
+        """Returns the class of a name; its module is imported here. One from a file takes precedence over others.
 
         Raises:
-            UnknownKind: there is none.
+            UnknownKind: there is no class of this name.
             PluginError: an installed package names it, and it does not load.
         """
         found: Any
@@ -47,7 +47,7 @@ class Register(Generic[Kind]):
             return found
         if found := self._own.get(name):
             return resolve_name(found) if isinstance(found, str) else found
-        for entry in entry_points_of(self.group):  # whoever uses none of other packages needs no search
+        for entry in entry_points_of(self.group):  # nothing is searched unless a class of another package is used
             if entry.name == name:
                 return loaded(entry)
         raise UnknownKind(

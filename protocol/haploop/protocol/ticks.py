@@ -13,7 +13,7 @@ from haploop.protocol.scene.scene import MOST_RATE_HZ, Clock, Run, Scene
 _WHOLE_WITHIN = 1e-6
 # The key of a scene by which the delay is set, also while a loop runs.
 DELAY = "clock.round_trip_delay"
-# What one run can hold in memory and come to the end of: plant steps in a tick, commands on their way, ticks in all.
+# The most that one run can hold in memory and finish: plant steps in a tick, commands on their way, ticks in all.
 _MOST_STEPS, _MOST_ON_THEIR_WAY, _MOST_TICKS = 10_000, 100_000, 10**10
 # Some 5 MB: a message of more than 64 MiB is refused, and all that is on its way is held in memory.
 _MOST_STEPS_IN_A_BLOCK = 1 << 16
@@ -47,8 +47,9 @@ class Timebase:
         """Makes the timebase of a scene's ``[clock]`` table and its duration in seconds.
 
         Raises:
-            TimebaseError: the plant rate is no whole multiple of the control rate, the delay is no whole number of
-                plant steps, or the duration is no whole number of control ticks; all that apply, one sentence each.
+            TimebaseError: the plant rate is not a whole multiple of the control rate, the delay is not a whole number
+                of plant steps, or the duration is not a whole number of control ticks; one sentence for each that
+                applies.
         """
         plant_rate, control_rate = clock.plant_rate, clock.control_rate
         delay = clock.round_trip_delay
@@ -124,7 +125,7 @@ class Timebase:
 
 
 def _not_whole(plant_rate: int, control_rate: int) -> str:
-    """Returns the complaint of rates that do not divide, with the nearest of either that do."""
+    """Returns the complaint about rates of which one does not divide the other, with the nearest of each that would."""
     times = plant_rate / control_rate
     rates = [n * control_rate for n in (math.floor(times), math.ceil(times)) if n]
     counts = range(math.ceil(times), _MOST_STEPS + 1), range(min(math.floor(times), _MOST_STEPS), 0, -1)
@@ -137,7 +138,7 @@ def _not_whole(plant_rate: int, control_rate: int) -> str:
 
 
 def whole_count(seconds: float, rate: int, name: str, units: str, complaints: list[str]) -> int:
-    """Returns ``seconds * rate`` as a whole number; where it is none, appends a complaint that names the nearest two.
+    """Returns ``seconds * rate`` as a whole number; if it is not one, appends a complaint that names the nearest two.
 
     Args:
         name: what the sentence begins with.
@@ -156,12 +157,12 @@ def whole_count(seconds: float, rate: int, name: str, units: str, complaints: li
     return nearest
 
 
-# A plant rate is offered up to so many times the given one.
+# A plant rate of up to this many times the given one is suggested.
 _MOST_TIMES = 100
 
 
 def _whole_at(seconds: float, rate: int) -> str:
-    """Returns a sentence with the least multiple of a plant rate at which a time is whole steps; "" for none."""
+    """Returns a sentence with the least multiple of a plant rate that makes a time whole steps; "" if there is none."""
     for times in range(2, min(_MOST_TIMES, MOST_RATE_HZ // rate) + 1):
         count = seconds * rate * times
         if abs(count - round(count)) <= _WHOLE_WITHIN:
@@ -170,19 +171,19 @@ def _whole_at(seconds: float, rate: int) -> str:
 
 
 def too_long(name: str, delay_s: float, control_rate: int) -> list[str]:
-    """Returns a complaint of a delay in which more commands are on their way than can be held; none of another."""
+    """Returns a complaint about a delay with more commands on their way than can be held; an empty list for others."""
     if delay_s * control_rate <= _MOST_ON_THEIR_WAY:
         return []
     most_s = _MOST_ON_THEIR_WAY / control_rate
     return [f"{name} must be at most {most_s:g} s at {control_rate} Hz: the commands on their way are held at once."]
 
 
-# A block that takes no longer than this is never far behind what a viewer shows or a killed run leaves in its log.
+# With blocks that take no longer than this, a viewer, or the log of a killed run, is never far behind.
 AT_MOST_S = 0.1
-# A shorter block is not worth its messages: where time is granted tick by tick, so much of it makes a block, which is
-# what a page shows at once.
+# A shorter block is not worth its messages: where time is granted tick by tick, this much wall time makes a block,
+# which is what a page shows at once.
 _WORTH_S = 0.03
-# What is held back is told all the same where for so long no more is granted.
+# Ticks held back for a longer block are published anyway if nothing more is granted for this long.
 HELD_S = 0.01
 _FIRST_TICKS = 100
 
@@ -193,7 +194,7 @@ class BlockLength:
     No bit of a run depends on it.
 
     Args:
-        least_ticks: of a block, where fewer would cost as much time.
+        least_ticks: the shortest block, where a shorter one would cost as much time.
     """
 
     def __init__(
@@ -205,7 +206,7 @@ class BlockLength:
         self._began = wall_clock()
 
     def is_worth_it(self, ticks: int) -> bool:
-        """Tells whether so many ticks make a block: it is full, or has taken 0.03 s."""
+        """Tells whether this many ticks make a block: it is full, or has taken 0.03 s."""
         return ticks >= self.ticks or self._wall_clock() - self._began >= _WORTH_S
 
     def next(self) -> None:

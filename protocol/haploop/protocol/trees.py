@@ -22,7 +22,7 @@ T = TypeVar("T")
 def tree_map(function: Callable[..., Any], tree: T, *rest: Any) -> T:
     """Returns the tree with ``function(leaf, *leaves of the rest at the same place)`` in place of every leaf.
 
-    Raises ValueError where a node of the rest has another number of children.
+    Raises ValueError where a node of the rest has a different number of children.
     """
     children = _children(tree)
     if children is None:
@@ -41,7 +41,7 @@ def tree_leaves(tree: Any) -> list[Any]:
 
 
 def tree_unflatten(tree: T, leaves: Iterable[Any]) -> T:
-    """Returns the tree with these leaves, in the order of ``tree_leaves``; ValueError for another number of them."""
+    """Returns the tree with these leaves, in the order of ``tree_leaves``; ValueError for too few or too many."""
     left: Iterator[Any] = iter([*leaves])
     try:
         rebuilt = tree_map(lambda _: next(left), tree)
@@ -53,9 +53,9 @@ def tree_unflatten(tree: T, leaves: Iterable[Any]) -> T:
 
 
 def tree_select(tree: T, kept: np.ndarray) -> T:
-    """Returns the tree of the members that are kept, a truth value of every member, shape (members,).
+    """Returns the tree of the members to keep; ``kept`` has a truth value for every member, shape (members,).
 
-    Raises ValueError where the last axis of an array is neither of length 1 nor of that of ``kept``.
+    Raises ValueError where the last axis of an array has neither length 1 nor the length of ``kept``.
     """
     import numpy as np
 
@@ -65,15 +65,15 @@ def tree_select(tree: T, kept: np.ndarray) -> T:
 def tree_take(tree: T, places: np.ndarray) -> T:
     """Returns the tree of the members at these places, shape (members taken,), in their order.
 
-    An array of length 1 on its last axis stays.
+    An array whose last axis has length 1 is left as it is.
     """
     return tree_map(lambda leaf: leaf[..., places] if _has_members(leaf) else leaf, tree)
 
 
 def tree_member(tree: T, place: int) -> T:
-    """Returns the tree of one member: an array of shape (members,) becomes its number, one of more axes loses its last.
+    """Returns the tree of one member: an array of shape (members,) becomes its number, one with more axes loses one.
 
-    An array of length 1 on its last axis is that member's.
+    An array whose last axis has length 1 holds for every member.
     """
 
     def of_member(leaf: Any) -> Any:
@@ -87,7 +87,7 @@ def tree_member(tree: T, place: int) -> T:
 
 
 def tree_by_member(tree: Any, members: int) -> list[Any]:
-    """Returns the tree of every member by itself; the nodes are dicts and lists, the arrays of shape (members,)."""
+    """Returns a separate tree for every member; the nodes are dicts and lists, the arrays have shape (members,)."""
     if isinstance(tree, dict):
         return [dict(zip(tree, row, strict=True)) for row in _by_member([*tree.values()], members)]
     if isinstance(tree, list):

@@ -1,4 +1,4 @@
-"""Walls: what a virtual wall answers to a penetration and its rate, and what it holds.
+"""Walls: the force with which a virtual wall answers a penetration and its rate, and the energy it stores.
 
-``registry.make_wall`` is the way in.
+``registry.make_wall`` makes the wall of a scene.
 """

@@ -15,11 +15,11 @@ from haploop.protocol.walls.wall import Wall
 class HuntCrossley(Wall):
     """f = k p^n (1 + d p'), never below 0 (Hunt & Crossley 1975); V = k p^(n+1) / (n + 1).
 
-    It is written with the stiffness K that the wall shows at a reference depth p_r at rest: k = K p_r^(1-n), so that K
-    is in N/m whatever n. Left to itself the law is
+    The parameter is the stiffness K that the wall shows at rest at a reference depth p_r: k = K p_r^(1-n), so that K
+    is in N/m for any n. Left to itself the law gives
         v_in / d - ln(1 + d v_in) / d^2 = -v_out / d - ln(1 - d v_out) / d^2
-    between the speeds of coming and leaving a free mass, whatever the mass, K and n. Where it leaves faster than 1 / d
-    the force is 0: the wall never pulls.
+    for the speeds at which a free mass arrives and leaves, whatever the mass, K and n. Where the mass leaves faster
+    than 1 / d the force is 0: the wall never pulls.
     """
 
     kind: ClassVar[str] = "hunt-crossley"
@@ -45,9 +45,9 @@ class HuntCrossley(Wall):
 
 
 def power(base: Any, exponent: Any) -> Any:
-    """Returns base^exponent of a base >= 0, by roots and products: the same bits for floats and arrays.
+    """Returns base^exponent for a base >= 0, by roots and products: the same bits for floats and arrays.
 
-    ``exponent`` is a multiple of 1/4 from 0 up to 3.75; that of a library rounds otherwise for arrays.
+    ``exponent`` is a multiple of 1/4 from 0 up to 3.75. The power function of a library rounds differently for arrays.
     """
     half = root(base)
     result, left = 0.0 * base + 1.0, 0.0 * base + exponent

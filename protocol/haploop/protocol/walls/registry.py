@@ -1,4 +1,4 @@
-"""The register of walls, and the making of the one that a scene names."""
+"""The register of walls, and the function that makes the wall which a scene names."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ _REGISTER: Register[Wall] = Register("wall of the kind", Wall.group, WALLS)
 
 
 def wall_class(name: str) -> type[Wall]:
-    """Returns the wall of a name; UnknownKind for none."""
+    """Returns the wall class of a name; raises UnknownKind if there is none."""
     return _REGISTER.find(name)
 
 
 def all_walls() -> dict[str, type[Wall]]:
-    """Returns every wall by its name; all are imported."""
+    """Returns every wall class by its name; all are imported."""
     return _REGISTER.all()
 
 
 def class_of(table: WallTable | None) -> type[Wall]:
-    """Returns the wall that a scene's table names: a spring where it names none."""
+    """Returns the wall class that a scene's table names; the spring if it names none."""
     return Spring if table is None or table.kind is None else wall_class(table.kind)
 
 
 def make_wall(table: WallTable | None) -> Wall:
-    """Returns the wall of a resolved scene, or of a batch in a stacked one; one that is nowhere without a table."""
+    """Returns the wall of a resolved scene, or of a batch in a stacked one; without a table, one that is nowhere."""
     if table is None:
         return Spring(0.0, 0.0, 0.0)
     return class_of(table)(table.position, table.stiffness, -1.0 if table.occupies == "below" else 1.0, **table.others)
 
 
 def parameters_of(kind: type[Wall]) -> tuple[str, ...]:
-    """Returns the names of all numbers of a wall but its direction."""
+    """Returns the names of all numbers of a wall except its direction."""
     return "position", "stiffness", *kind.keys

@@ -1,4 +1,4 @@
-"""A spring with ridges along the way in."""
+"""A spring with ridges along the direction of penetration."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from haploop.protocol.walls.wall import Wall
 class Texture(Wall):
     """f = K p + a s(p / l): ridges of amplitude a, one every l, on a spring; V = K p^2 / 2 + a l S(p / l).
 
-    With u the part of p / l after the point and w = min(u, 1 - u), s = +-16 w (1/2 - w), + in the first half of a
-    ridge, and S = 4 w^2 - 16 w^3 / 3: arcs of parabolas, within 6 % of a sine, whose bits would depend on the library.
-    It stores all that it takes, and pulls towards a groove where a > K p. A friction cone has no place here: its force
-    is along a surface, and one degree of freedom has only the way into it.
+    With u the fractional part of p / l and w = min(u, 1 - u), s = +-16 w (1/2 - w), + in the first half of a ridge,
+    and S = 4 w^2 - 16 w^3 / 3: arcs of parabolas, within 6 % of a sine; the bits of a sine would depend on the library.
+    The wall stores all the energy that it takes, and pulls towards a groove where a > K p. A friction cone has no place
+    here: its force acts along a surface, and one degree of freedom has only the direction into it.
     """
 
     kind: ClassVar[str] = "texture"
@@ -40,7 +40,7 @@ class Texture(Wall):
         return 0.5 * (self.stiffness * depth) * depth + self.ridge_force * self.ridge_spacing * ridge
 
     def _place(self, depth: Any) -> tuple[Any, Any]:
-        """The way to the nearer end of the ridge, as a share of it, and whether that is where it begins."""
+        """Returns the distance to the nearer end of the ridge, as a share of it, and whether the ridge begins there."""
         ridges = depth / self.ridge_spacing
         over = ridges - floor(ridges)
         rises = over < 0.5

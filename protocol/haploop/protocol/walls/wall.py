@@ -13,15 +13,15 @@ from haploop.protocol.quantity import Quantity
 
 @dataclass(frozen=True, slots=True)
 class Wall(ABC):
-    """What pushes the device out while it is strictly inside; a tree of numbers, shared or one for each member.
+    """A wall, which pushes the device out while it is strictly inside; a tree of numbers, shared or one per member.
 
-    A subclass is a frozen dataclass that writes ``push`` and ``stored`` for depths p >= 0, with arithmetic and
-    ``where`` so that they serve floats, NumPy and JAX alike.
+    A subclass is a frozen dataclass that defines ``push`` and ``stored`` for depths p >= 0, with arithmetic and
+    ``where`` so that they work for floats, NumPy and JAX alike.
 
     Attributes:
-        kind: what ``wall.kind`` says to ask for it.
-        keys: declaration of the parameters that are its own; the default of a field is that of its key.
-        dissipates: whether its law takes energy beside what it stores; it then has a book of that.
+        kind: the value of ``wall.kind`` that asks for it.
+        keys: declarations of its own parameters; the default of a field is that of its key.
+        dissipates: whether its law takes energy besides what it stores; it then has a book of that energy.
         position, stiffness: x_w of its surface, m; its stiffness, N/m.
         inward: direction that leads into it, +1.0 or -1.0; 0.0 where there is no wall, so that nothing is inside.
     """
@@ -37,13 +37,13 @@ class Wall(ABC):
 
     @classmethod
     def parameters(cls) -> dict[str, tuple[Quantity, Any]]:
-        """Returns what it has beside position and stiffness, by name: the declaration, and the default or MISSING."""
+        """Returns its parameters besides position and stiffness by name: declaration, and default or MISSING."""
         defaults = {field.name: field.default for field in fields(cls)}
         return {name: (quantity, defaults.get(name, MISSING)) for name, quantity in cls.keys.items()}
 
     @classmethod
     def complaint(cls) -> str:
-        """Returns what is wrong with a class that is to be a wall; "" where nothing is."""
+        """Returns what is wrong with a class that is meant to be a wall; "" if nothing is."""
         known = {field.name for field in fields(cls)}
         if lacks := [key for key in cls.keys if key not in known]:
             return (
@@ -61,7 +61,7 @@ class Wall(ABC):
         """Returns its potential V(p), J, for a depth p >= 0; V(0) = 0."""
 
     def held(self, depth: Any) -> Any:
-        """Returns V'(p), the part of the force that is stored, N; without a law that dissipates all of it."""
+        """Returns V'(p), the part of the force whose energy is stored, N; all of it if the law does not dissipate."""
         return self.push(depth, 0.0)
 
     def stored_between(self, before: Any, after: Any) -> Any:
@@ -83,7 +83,7 @@ class Wall(ABC):
         return contact, where(contact, -self.inward * push, 0.0)
 
     def values(self) -> dict[str, Any]:
-        """Returns its numbers by name as telemetry tells them: position, stiffness and the parameters of its own."""
+        """Returns its numbers by name as telemetry reports them: position, stiffness and its own parameters."""
         return {name: getattr(self, name) for name in ("position", "stiffness", *self.keys)}
 
 
@@ -106,7 +106,7 @@ class Spring(Wall):
         return self.stiffness, 0.0
 
     def contact(self, x: Any, v: Any) -> tuple[Any, Any]:
-        """Does what that of every wall does, in fewer steps."""
+        """Does the same as ``Wall.contact``, in fewer steps."""
         out = self.position - x
         contact = out * self.inward < 0.0
         return contact, where(contact, self.stiffness * out, 0.0)
