@@ -1,4 +1,4 @@
-"""The tables of the effects a real device has. Each is simulated only where the scene holds its table."""
+"""The tables of the effects a real device has. Each is simulated only if the scene has its table."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Noise(Table):
 
 
 class Accelerometer(Table):
-    """A real accelerometer in place of the ideal one: what is left out of it is ideal."""
+    """A real accelerometer in place of the ideal one: whatever the table leaves out is ideal."""
 
     range: Annotated[float | None, si("m/s^2", "largest reading to either side", above=0)] = None
     resolution: Annotated[float | None, si("m/s^2", "one count", above=0)] = None
@@ -30,7 +30,7 @@ class Accelerometer(Table):
 
 
 class Friction(Table):
-    """Dry friction, at the motor where there is a transmission; it holds what does not move, exactly."""
+    """Dry friction, at the motor if there is a transmission; it holds exactly what does not move."""
 
     kinetic: Annotated[float, si("N", "force against the motion", at_least=0)]
     breakaway: Annotated[float | None, si("N", "force that sets it in motion, at least kinetic", at_least=0)] = None
@@ -49,7 +49,7 @@ class Transmission(Table):
 
 
 class Grip(Table):
-    """The grip between the tip and the hand's mass, on which the force of the muscles then acts."""
+    """The grip between the tip and the hand's mass; the force of the muscles then acts on that mass."""
 
     stiffness: Annotated[float, si("N/m", "stiffness", above=0)]
     damping: Annotated[float, si("N s/m", "viscous damping", at_least=0)] = 0.0
@@ -85,7 +85,7 @@ class GammaJitter(Table):
 
 
 class Loss(Table):
-    """Commands are lost, each by itself; the device holds the last one it got."""
+    """Commands are lost, each independently of the others; the device holds the last one it received."""
 
     probability: Annotated[float, si("", "share of the commands that are lost", at_least=0, at_most=1)]
 

@@ -1,4 +1,4 @@
-"""The ``[hand.force]`` table: tau(t), one class a kind."""
+"""The ``[hand.force]`` table: tau(t), one class per kind."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class HandForce(Table):
-    """Base of every kind of force: a table of its numbers, and ``force_at``, the force at times.
+    """Base of every kind of force: a table of its numbers, and ``force_at``, the force at given times.
 
     In a batch a number may be an array of shape (members,); times then have the shape (n, 1).
     """
@@ -29,12 +29,12 @@ class HandForce(Table):
         raise NotImplementedError(f"{type(self).__name__} has no method force_at.")
 
     def constant_from_s(self) -> float:
-        """Returns the time in s from which on it stays the same; infinity where that is not known."""
+        """Returns the time in s from which the force stays the same; infinity if that is not known."""
         return math.inf
 
     @classmethod
     def of_kind(cls, kind: str) -> type[HandForce]:
-        """Returns the class of a kind; of one that is not at hand, one that holds any numbers and makes no force."""
+        """Returns the class of a kind; for an unavailable kind, one that holds any numbers and makes no force."""
         try:
             return FORCES.find(kind)
         except UnknownKind:
@@ -50,7 +50,7 @@ class HandForce(Table):
         """Returns its numbers by name: the declaration, and the default or MISSING.
 
         Raises:
-            TypeError: one is not declared as a number.
+            TypeError: one of them is not declared as a number.
         """
         hints, found = get_type_hints(cls, include_extras=True), dict[str, tuple[Quantity, Any]]()
         for name, default in cls._defaults.items():
@@ -62,7 +62,7 @@ class HandForce(Table):
 
     @classmethod
     def complaint(cls) -> str:
-        """Returns what is wrong with a class that is to be a hand's force; "" where nothing is."""
+        """Returns what is wrong with a class that is meant to be a hand's force; "" if nothing is."""
         if cls.force_at is HandForce.force_at:
             return "has no method force_at, which it must define: the force in N at an array of times in s."
         try:
@@ -72,12 +72,12 @@ class HandForce(Table):
         return ""
 
     def __reduce__(self) -> tuple[Callable[..., HandForce], tuple[str, dict[str, Any]]]:
-        """Tells another process its kind: it has the class of a plugin file under that name alone."""
+        """Passes the kind to another process, which has the class of a plugin file only under that name."""
         return _made, (self.kind, vars(self))
 
 
 class UnknownForce(HandForce, OpenTable):
-    """A force whose kind is not at hand."""
+    """A force whose kind is not available."""
 
     def force_at(self, t: ndarray) -> ndarray:
         """Raises UnknownKind."""
@@ -114,7 +114,7 @@ class Constant(HandForce):
 
 
 class Ramp(HandForce):
-    """In a straight line from 0 at t = 0 to value at rise_time, then held."""
+    """A straight line from 0 at t = 0 to value at rise_time, then held."""
 
     kind = "ramp"
     value: Force
@@ -130,7 +130,7 @@ class Ramp(HandForce):
 
 
 class Step(HandForce):
-    """0 before, value from the time at on."""
+    """0 before the time ``at``, value from then on."""
 
     kind = "step"
     value: Force
@@ -180,7 +180,7 @@ class MinimumJerk(HandForce):
 class Trace(HandForce):
     """Recorded samples, joined by straight lines, held before the first and after the last.
 
-    A scene file gives the lists time and force, or as ``file`` the path of a CSV of two columns, relative to its own.
+    A scene file gives the lists time and force, or as ``file`` the path of a two-column CSV, relative to its folder.
     """
 
     kind = "trace"
@@ -202,5 +202,5 @@ FORCES: Register[HandForce] = Register(
 
 
 def constant_from_s(force: HandForce | None) -> float:
-    """Returns the time in s from which on a hand's force stays the same: infinite of a sine and of a trace."""
+    """Returns the time in s from which a hand's force stays the same: infinite for a sine and for a trace."""
     return 0.0 if force is None else force.constant_from_s()

@@ -1,4 +1,4 @@
-"""Dotted keys of a scene, such as ``dissipation.0.mass``: the value there, another one there, nothing there."""
+"""Dotted keys of a scene, such as ``dissipation.0.mass``: the value there is read, replaced or removed."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def with_value(table: TableType, key: str, value: Any) -> TableType:
 
 
 def with_values(table: TableType, values: Mapping[str, Any]) -> TableType:
-    """Returns a table with other values at some dotted keys, as ``with_value`` does one by one."""
+    """Returns a table with other values at some dotted keys, as ``with_value`` does for one key."""
     changed: Tables = {}
     for key, value in values.items():
         first, _, rest = key.partition(".")
@@ -49,7 +49,7 @@ def with_values(table: TableType, values: Mapping[str, Any]) -> TableType:
 
 
 def _within(inner: Any, key: str, rest: str, value: Any) -> Any:
-    """Returns what stands at the first part of a key with another value at the rest of it."""
+    """Returns the value at the first part of a key, with another value at the rest of the key."""
     if not rest:
         return value
     if isinstance(inner, tuple):
@@ -62,7 +62,7 @@ def _within(inner: Any, key: str, rest: str, value: Any) -> Any:
 
 
 def without(table: TableType, *keys: str) -> TableType:
-    """Returns a table without some dotted keys, each at its default; an absent key changes nothing."""
+    """Returns a table without some dotted keys, which take their defaults; an absent key changes nothing."""
     for key in keys:
         first, _, rest = key.partition(".")
         inner = value_at(table, first)

@@ -11,13 +11,13 @@ from haploop.protocol.scene.estimators import Acceleration, Velocity
 from haploop.protocol.scene.hand_force import HandForce
 from haploop.protocol.scene.table import OpenTable, Table, Tables
 
-# Light takes 2.6 s to the moon and back; what is later is no answer to a hand.
+# Light takes 2.6 s to the moon and back; a force that is later than this is no answer to a hand.
 LONGEST_DELAY_S = 10.0
 MOST_RATE_HZ = 10**7
 
 
 class Clock(Table):
-    """Rates, delay and what moves the plant; the plant rate is a whole multiple of the control rate."""
+    """Rates, delay and the method that moves the plant; the plant rate is a whole multiple of the control rate."""
 
     plant_rate: Annotated[
         int, si("Hz", "steps of the plant per second", whole=True, at_least=1, at_most=MOST_RATE_HZ)
@@ -43,8 +43,8 @@ class Device(Table):
 class Hand(Table):
     """The hand, attached rigidly (Choi et al. 2022, eq. 11) or by a grip, and the force of its muscles.
 
-    One of kind "unmodelled" has no other key: only a program of somebody else's moves its device, and its work is
-    booked as what closes the balance.
+    A hand of kind "unmodelled" has no other key: only a foreign program moves its device, and the work of the hand is
+    booked as what closes the energy balance.
     """
 
     kind: Literal["unmodelled"] | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -64,7 +64,7 @@ class Encoder(Table):
 
 
 class Wall(OpenTable):
-    """The virtual wall, felt inside: a spring, or of the kind that is named, with the parameters of that kind."""
+    """The virtual wall, felt inside it: a spring, or a wall of the named kind with the parameters of that kind."""
 
     kind: str | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
     position: Annotated[float, si("m", "where the surface is")]
@@ -90,7 +90,7 @@ class Run(Table):
     faulty_swap: Literal["restore", "end"] = "restore"
 
 
-# The kind of a swap that takes an element out.
+# The kind of a swap that removes an element.
 NO_ELEMENT = "none"
 
 
@@ -106,7 +106,7 @@ class ElementTable(Table):
 
     @classmethod
     def from_dict(cls, data: Tables) -> ElementTable:
-        """Makes it from ``{"kind": ..., "acts": ..., parameter: value, ...}``."""
+        """Makes the table from ``{"kind": ..., "acts": ..., parameter: value, ...}``."""
         parameters = {key: value for key, value in data.items() if key not in ("kind", "acts")}
         return cls(name=data["kind"], acts=data.get("acts", "in-contact"), parameters=parameters)
 
@@ -171,7 +171,7 @@ class Scene(OpenTable):
 
 
 def hand_is_unmodelled(scene: Scene) -> bool:
-    """Tells whether nothing but the device is known of what moves: no program here can move such a scene."""
+    """Tells whether only the device is known of all that moves: no program here can move such a scene."""
     return scene.hand is not None and scene.hand.kind is not None
 
 

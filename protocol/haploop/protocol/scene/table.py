@@ -11,27 +11,27 @@ from typing import Annotated, Any, ClassVar, NoReturn, Self, Union, dataclass_tr
 
 # Tables as plain dicts, as TOML and the wire hold them.
 Tables = dict[str, Any]
-# Values that stand in a table as they are.
+# Types of the values that stand in a table unchanged.
 _PLAIN = (float, int, str, bool)
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
 @dataclasses.dataclass(init=False, repr=False, eq=False)
 class Table:
-    """Base of every table; a subclass is a frozen dataclass with keyword arguments by itself.
+    """Base of every table; a subclass automatically is a frozen dataclass with keyword arguments.
 
-    A key declared ``X | None`` with default None is absent unless it is given: the effect is then not simulated.
+    A key declared ``X | None`` with default None is absent unless it is given; an absent effect is not simulated.
     A number that differs from member to member of a batch is an array of shape (batch,).
 
-    The methods of a dataclass stand here once for all tables: compiled for each of them, as ``dataclass`` does, they
-    would take longer than all else that a node does before its first tick.
+    The methods of a dataclass stand here once for all tables: compiling them for each table, as ``dataclass`` does,
+    would take longer than everything else that a node does before its first tick.
 
     Attributes:
         kind: name by which a scene file chooses between tables in one place; "" where there is no choice.
     """
 
     kind: ClassVar[str] = ""
-    # Default of every key, in order of declaration; the keys that have none, and what makes those of others.
+    # Default of every key, in order of declaration; keys without a default; keys whose default is made by a function.
     _defaults: ClassVar[Tables] = {}
     _needed: ClassVar[tuple[str, ...]] = ()
     _made: ClassVar[tuple[tuple[str, Callable[[], Any]], ...]] = ()
@@ -72,7 +72,7 @@ class Table:
 
     @classmethod
     def of_kind(cls, kind: str) -> type[Table] | None:
-        """Returns the class of a table of a kind where this one is declared; None for none."""
+        """Returns the class of a kind that may stand where this class is declared; None if there is none."""
         return cls if cls.kind == kind else None
 
     @classmethod
@@ -117,7 +117,7 @@ class OpenTable(Table):
 
     @classmethod
     def from_dict(cls, data: Tables) -> Self:
-        """Makes the table as ``Table.from_dict`` does; keys that it does not declare are those of others."""
+        """Makes the table as ``Table.from_dict`` does; keys that it does not declare go to ``others``."""
         declared = cls._defaults.keys()
         if declared >= data.keys():
             return super().from_dict(data)
@@ -126,14 +126,14 @@ class OpenTable(Table):
         return dataclasses.replace(made, others=others) if others else made
 
     def as_dict(self) -> Tables:
-        """Returns the table as ``Table.as_dict`` does, the keys of others last."""
+        """Returns the table as ``Table.as_dict`` does, with the keys in ``others`` last."""
         written = super().as_dict()
         return written | written.pop("others")
 
 
 @cache
 def _tables_at(cls: type[Table], key: str) -> tuple[type[Table], ...]:
-    """The table classes that may stand at a key."""
+    """Returns the table classes that may stand at a key."""
     field = cls.__dataclass_fields__.get(key)
     hint = field.type if field else None
     if isinstance(hint, str):
@@ -160,7 +160,7 @@ def _read(cls: type[Table], key: str, value: Any) -> Any:
 
 
 def as_plain(value: Any) -> Any:
-    """Returns a value of a table with tables in it as dicts and tuples as lists."""
+    """Returns a value of a table, with the tables in it as dicts and tuples as lists."""
     if value.__class__ in _PLAIN:
         return value
     if isinstance(value, Table):

@@ -1,4 +1,4 @@
-"""TCP addresses as people write them: to bind, checked on this machine, and to connect to on another."""
+"""TCP addresses as people write them: those to bind, checked on this machine, and those to connect to on another."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ def address_to_bind(text: str, ports: int, is_guarded: bool) -> tuple[str, int]:
     """Reads ADDRESS or ADDRESS:PORT, an IPv6 address with a port in brackets; the port is 0 where none is named.
 
     Args:
-        ports: how many in a row are needed.
-        is_guarded: by keys; only then may others than this machine reach them.
+        ports: how many ports in a row are needed.
+        is_guarded: whether keys guard them; only then may other machines reach them.
 
     Raises:
-        TransportError: no numeric address, none of this machine, one in the open, or a port that is taken.
+        TransportError: the address is not numeric, not of this machine, or open to others without keys, or a port is
+            taken.
     """
     host, port_text = _split(text)
     try:
@@ -41,7 +42,7 @@ def address_to_bind(text: str, ports: int, is_guarded: bool) -> tuple[str, int]:
 
 
 def address_to_reach(text: str) -> str:
-    """Reads HOST:PORT, with or without tcp://, as the address of a run's clock; TransportError where it is none."""
+    """Reads HOST:PORT, with or without tcp://, as the address of a run's clock; TransportError if it is not one."""
     host, port = _split(text.removeprefix("tcp://"))
     if not host or not port or not host.isprintable() or set(host) & set("/@ "):
         raise TransportError(
@@ -55,9 +56,9 @@ def address_to_reach(text: str) -> str:
 
 
 def own_address_towards(clock: str) -> str:
-    """Returns the address of this machine, with any port, at which whoever can reach the clock can reach it, too.
+    """Returns the address, with any port, at which a program that can reach the clock can reach this machine too.
 
-    On the clock's own machine that is every address, since whoever has reached the clock knows one.
+    On the clock's own machine it stands for every address, since whoever has reached the clock knows one of them.
     """
     host, port = _split(clock.removeprefix("tcp://"))
     with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM) as trial:
@@ -69,7 +70,7 @@ def own_address_towards(clock: str) -> str:
 
 
 def _split(text: str) -> tuple[str, str]:
-    """Returns host and port, "" for none; an IPv6 address has a port only behind its brackets."""
+    """Returns host and port, "" for none; an IPv6 address has a port only after its brackets."""
     host, colon, port = text.rpartition(":")
     if not colon or text.endswith("]") or (":" in host and not host.endswith("]")):
         host, port = text, ""

@@ -22,7 +22,7 @@ from haploop.protocol.transport.sockets import (
 )
 from haploop.protocol.transport.wire import Frame, Message, WireError, decode, encode
 
-# A node that waits says so this often, so that the clock can tell who is being waited for.
+# A node that waits reports it this often, so that the clock can tell who is being waited for.
 REPORT_MS = 200
 _JOIN_S = 20.0
 _LOOK_MS = 250
@@ -43,7 +43,7 @@ class ClockClient:
     """Speaks to the clock for one node.
 
     Args:
-        is_watched: whether the fate of a local connection is watched, too, as that of one over a network always is.
+        is_watched: whether a local connection is watched too, as one over a network always is.
 
     Attributes:
         until: ticks before this one may be worked on.
@@ -69,8 +69,8 @@ class ClockClient:
         self._connection = None
         if (is_watched or address.startswith("tcp:")) and isinstance(context, SecureContext):
             self._connection = Connection(context, self.socket, address)
-        # One of the run's own that is cut off is known no more; the last words of a run may still be on their way to
-        # any other.
+        # The run has dropped one of its own processes that is cut off; to any other node the last messages of the run
+        # may still be on their way.
         self._grace_s = 0.0 if role in PROCESSES else _GRACE_S
         self._lost = _LOST.format(address.removeprefix("tcp://"), transport.patience_s)
         connect(self.socket, address)
@@ -85,7 +85,7 @@ class ClockClient:
         """Asks to take part, waits for the WELCOME and returns its fields by name.
 
         Raises:
-            Refused: the clock said no, or said nothing for 20 s.
+            Refused: the clock refused, could not be reached, or sent nothing for 20 s.
             Aborted: the run failed before it began.
         """
         if any(with_host_of(address, "") != address for address in endpoints.values()):
@@ -113,14 +113,14 @@ class ClockClient:
         raise Refused(f"The clock did not answer within {_JOIN_S:g} s; is the run still there?")
 
     def _say(self, name: str, *fields: Any) -> None:
-        """Sends a message, once there is room; where the connection does not stand, it is lost, and others tell why."""
+        """Sends a message, once there is room; if the connection is down, it is lost, and other calls report why."""
         frame = encode(name, *fields)
         self._due = self._now() + REPORT_MS / 1000
         if not send_at_once(self.socket, frame) and not (self._connection and self._connection.is_down()):
             self.socket.send(frame)
 
     def poll(self) -> None:
-        """Takes what the clock has sent, without waiting; raises Aborted where its host can no longer be reached."""
+        """Takes what the clock has sent, without waiting; raises Aborted if its host can no longer be reached."""
         while has_message(self.socket):
             self._receive()
         if self._connection and self._connection.lost_s() > self._grace_s:
@@ -175,8 +175,8 @@ class ClockClient:
         return self._now() >= self._due
 
     def keep_in_touch(self, tick: int, on: str) -> None:
-        """Reports WAITING, and takes what the clock has sent, where a node at work has been quiet."""
-        if self._now() >= self._due:  # asked with every message of the loop
+        """Reports WAITING, and takes what the clock has sent, if a node at work has been quiet."""
+        if self._now() >= self._due:  # checked with every message of the loop
             self.waiting(tick, on)
             self.poll()
 
@@ -190,7 +190,7 @@ class ClockClient:
         self.close(linger_ms=1000)
 
     def leave_at_the_end(self, tick: int, result: Message) -> None:
-        """Sends DONE, and closes once the clock has: until then what was published here may still be on its way.
+        """Sends DONE, and closes once the clock has closed: until then what was published may still be on its way.
 
         Raises Aborted where the run fails meanwhile.
         """
@@ -202,6 +202,6 @@ class ClockClient:
 
     def close(self, linger_ms: int = 0) -> None:
         """Closes the connection; what was sent last has some time to go out."""
-        if self._connection:  # while it closes it must tell nobody of its connection: it could wait for ever
+        if self._connection:  # while it closes it must report no events of its connection: it could wait for ever
             self.socket.disable_monitor()
         self.socket.close(linger=linger_ms)

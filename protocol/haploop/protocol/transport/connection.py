@@ -1,4 +1,4 @@
-"""Fate of a TCP connection to a clock, from the library's events: why it fails, and when it is lost."""
+"""State of a TCP connection to a clock, from the library's events: why it fails, and when it is lost."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _EVENTS = (
     | zmq.EVENT_HANDSHAKE_FAILED_PROTOCOL
     | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL
 )
-# A failure that may pass is told when it has lasted so long, s, and silence, which a bad network makes, later.
+# A failure that may pass is reported once it has lasted this long, s; silence, which a bad network causes, later.
 _TOLD_AFTER_S, _SILENCE_AFTER_S = 2.0, 5.0
 
 _UNKNOWN_KEY = (
@@ -51,11 +51,11 @@ class Connection:
         self._monitor = context.watch(socket, _EVENTS)
         self._began = time.monotonic()
         self._stands = self._has_stood = False
-        self._since = self._began  # when it began to be as it is now
+        self._since = self._began  # when its present state began
         self._why, self._is_final = _NO_ANSWER, False
 
     def trouble(self) -> str:
-        """Returns why the connection does not come to stand, as a sentence; "" while it may still, and once it has."""
+        """Returns why the connection cannot be made, as a sentence; "" while it still may be, and once it has been."""
         self._take()
         patience_s = _SILENCE_AFTER_S if self._why in (_NO_ANSWER, _SILENT) else _TOLD_AFTER_S
         if self._has_stood or not (self._is_final or time.monotonic() - self._began > patience_s):
@@ -63,12 +63,12 @@ class Connection:
         return self._why.format(self._address.removeprefix("tcp://"))
 
     def is_down(self) -> bool:
-        """Tells whether the connection does not stand."""
+        """Tells whether the connection is down."""
         self._take()
         return not self._stands
 
     def lost_s(self) -> float:
-        """Returns how long a connection that stood has been gone, s; 0 while it stands, or never has."""
+        """Returns how long an established connection has been lost, s; 0 while it stands, or if it never has."""
         self._take()
         return 0.0 if self._stands or not self._has_stood else time.monotonic() - self._since
 

@@ -1,7 +1,7 @@
 """CURVE keys: one certificate for the clock, one for each process of a run and one for clients, in one directory.
 
-``clock.key`` and ``clients/*.key`` are public; ``NAME.key_secret`` holds both keys of NAME and is its secret. A host
-from which a run elsewhere is watched and steered needs ``clock.key`` and ``client.key_secret`` alone.
+``clock.key`` and ``clients/*.key`` are public; ``NAME.key_secret`` holds both keys of NAME and is secret. A host
+from which a run elsewhere is watched and steered needs only ``clock.key`` and ``client.key_secret``.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ _SECRET = '    secret-key = "{}"\n'
 
 
 class KeysError(ValueError):
-    """Raised for keys that are not there, not whole, or open to others; the message says what to do."""
+    """Raised for keys that are missing, incomplete, or open to others; the message says what to do."""
 
 
 @dataclass(frozen=True)
 class Keys:
-    """What one program is given of the keys, as Z85 texts of 40 letters.
+    """The keys that one program is given, as Z85 texts of 40 characters.
 
     Attributes:
         public, secret: its own pair.
         clock: the public key of the clock; those of the run's processes come with their addresses.
-        known: name -> public key of each who may connect to sockets that it binds; none for a client.
+        known: name -> public key of everyone who may connect to sockets that it binds; empty for a client.
     """
 
     public: str
@@ -46,10 +46,10 @@ class Keys:
 
 
 def make_keys(directory: Path) -> list[str]:
-    """Makes the certificates that a directory lacks, mode 0600, and returns for whom; none there is changed.
+    """Makes the certificates that a directory lacks, mode 0600, and returns their holders; changes no existing one.
 
     Raises:
-        KeysError: it cannot be written, is open to others, or is the copy that a client was given.
+        KeysError: the directory cannot be written, is open to others, or is the copy that a client was given.
     """
     try:
         directory.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -69,10 +69,10 @@ def make_keys(directory: Path) -> list[str]:
 
 
 def read_keys(directory: Path, holder: str) -> Keys:
-    """Returns what ``holder`` (clock, a role of the run's processes, or client) is given of a directory of keys.
+    """Returns the keys that ``holder`` (clock, a role of the run's processes, or client) is given from a directory.
 
     Raises:
-        KeysError: a file is missing, is no certificate, or others can read or replace it.
+        KeysError: a file is missing, is not a certificate, or others can read or replace it.
     """
     if not directory.is_dir():
         raise KeysError(f"There is no directory of keys {directory}; haploop keys {directory} makes one.")
@@ -91,7 +91,7 @@ def _secret_of(directory: Path, holder: str) -> Path:
 
 
 def _make_pair(directory: Path, holder: str) -> bool:
-    """Makes a pair where there is none; tells whether it did. Of two at once only one does."""
+    """Makes a pair if there is none; tells whether it did. Of two processes at once only one does."""
     public, secret = (key.decode() for key in zmq.curve_keypair())
     try:
         _write(_secret_of(directory, holder), (_CERTIFICATE + _SECRET).format(public, secret), 0o600, os.link)

@@ -19,19 +19,19 @@ _COMMANDS = MESSAGES["COMMANDS"].code
 _SAMPLES = MESSAGES["SAMPLES"].code
 _LAST = MESSAGES["LAST"].code
 
-# True equals 1, and so does 1.0; the types of what came are looked at, too.
+# True equals 1, and so does 1.0; the types of received values are checked too.
 _NUMBERS = frozenset({int, float})
 
 # Without delay a message holds one number. Its bytes are msgpack's: four entries, version and code; the tick as uint32;
-# a list of one sample of one float64, or of one force. They are made and known at once, which is three times as quick.
+# a list of one sample of one float64, or of one force. Packing and recognising them in one step is three times as fast.
 _SAMPLE, _COMMAND = Struct(">4sI3sd"), Struct(">4sI2sd")
 _SAMPLE_BEGINS, _COMMAND_BEGINS = (bytes((0x94, VERSION, code, 0xCE)) for code in (_SAMPLES, _COMMANDS))
 _SAMPLE_LIST, _COMMAND_LIST = b"\x91\x91\xcb", b"\x91\xcb"
 _LATEST = 2**32 - 1
-# A plain int, which is quicker to pass than what zmq has.
+# A plain int, which is faster to pass than zmq's own constant.
 _MORE = int(zmq.SNDMORE)
 
-# So often a controller that gets no samples sees to what else it has to do.
+# A controller that gets no samples turns to its other work this often.
 IDLE_MS = 20
 
 Idle = Callable[[], None]
@@ -182,7 +182,7 @@ class ControllerEnd:
 
 
 def check_samples(tick: int, samples: list[list[float]], values: int) -> None:
-    """Raises LoopError where a sample of a plant that is not haploop's own is no list of so many finite numbers."""
+    """Raises LoopError where a sample of a foreign plant is not a list of ``values`` finite numbers."""
     for at, sample in enumerate(samples, tick):
         is_list = type(sample) is list and len(sample) == values
         if not is_list or not all(type(value) in (int, float) and math.isfinite(value) for value in sample):

@@ -1,6 +1,6 @@
 """The machine that a node runs on: wall clock, waiting on several sockets, and files.
 
-It comes with the context of the sockets, so that a simulation can stand in for all that a node meets of the world.
+It comes with the context of the sockets, so that a simulation can replace everything that a node meets of the world.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ class Machine:
     """The machine of this process.
 
     Attributes:
-        now: returns the wall clock, s, which never goes back.
+        now: returns the wall clock, s, which never goes backwards.
     """
 
     now = staticmethod(time.monotonic)
@@ -27,7 +27,7 @@ class Machine:
         return zmq.Poller()
 
     def wait(self, poller: zmq.Poller, seconds: float) -> dict[Any, int]:
-        """Waits for at most some time, to a tenth of a ms where a poller counts whole ms; returns what is ready."""
+        """Waits at most ``seconds``, to a tenth of a ms although a poller counts whole ms; returns what is ready."""
         ready = poller.poll(int(seconds * 1000))
         if not ready and seconds < 0.001:
             try:
@@ -38,7 +38,7 @@ class Machine:
         return dict(ready)
 
     def create(self, path: Path) -> RawIOBase:
-        """Opens a new file for writing, over any of that name; every write goes to the operating system at once."""
+        """Opens a new file for writing, replacing any of that name; each write goes to the operating system at once."""
         return cast(RawIOBase, path.open("wb", buffering=0))
 
     def write(self, path: Path, data: bytes) -> None:

@@ -35,10 +35,10 @@ def run_node(role: str, work: Work) -> None:
     """Runs a node as a process, ``python -m module``, and exits with status 0 after DONE, else 1.
 
     Stdin brings one line of JSON: directory of the sockets, address of the clock, secret and transport of the run, the
-    file to which what is printed goes, and the cores to stay on, null for any.
+    file for what is printed, and the cores to stay on, null for any.
 
-    It stays open as long as the launcher lives; at its end this process ends at once, whatever it is doing. After DONE
-    one line more comes: those who may miss nothing have what was published, and this process may go.
+    Stdin stays open as long as the launcher lives; when it closes, this process ends at once, whatever it is doing.
+    After DONE one more line comes: the lossless listeners have received what was published, and this process may end.
     """
     line = sys.stdin.readline()
     if not line:
@@ -58,8 +58,8 @@ def stay_on(cores: list[int], takes_turns: bool) -> None:
     """Keeps this process on some cores, as far as the system lets it.
 
     Args:
-        takes_turns: whether it shares its core with a partner, and each works while the other waits. To be interrupted
-            by every thread that a message wakes gains nothing there and costs two switches: it is scheduled as a batch.
+        takes_turns: whether it shares its core with a partner, and each works while the other waits. Interruption by
+            every thread that a message wakes then gains nothing and costs two switches, so it is scheduled as a batch.
     """
     with contextlib.suppress(OSError):
         os.sched_setaffinity(0, cores)
@@ -68,11 +68,11 @@ def stay_on(cores: list[int], takes_turns: bool) -> None:
 
 
 class LineOfLife:
-    """A pipe from the launcher: this process ends with it at once, and waits at its own end for a line to go."""
+    """A pipe from the launcher: when it closes, this process ends at once; a line on it lets this process end."""
 
     def __init__(self, pipe: TextIO) -> None:
         self._pipe, self._may_go = pipe, threading.Event()
-        with contextlib.suppress(OSError):  # where compiled code lets no thread run, the kernel ends this process
+        with contextlib.suppress(OSError):  # if compiled code lets no thread run, the kernel ends this process
             fcntl.fcntl(pipe, fcntl.F_SETOWN, os.getpid())
             self._alarm(fcntl.FASYNC)
         threading.Thread(target=self._heed, daemon=True).start()
@@ -87,7 +87,7 @@ class LineOfLife:
         os._exit(1)
 
     def loosen(self) -> None:
-        """Lets the line come, which would end this process before its work is done."""
+        """Allows the line to come; before this call, while work is not done, it would end this process."""
         with contextlib.suppress(OSError):
             self._alarm(0)
 
@@ -110,8 +110,8 @@ def take_part(
     Args:
         start: address of the clock and secret of the run.
         tell: is told why it did not end with DONE.
-        life: by which the launcher, where there is one, keeps what is published here until it has been taken; without
-            one the connection to the clock does, which lasts as long as the run.
+        life: pipe by which the launcher, if there is one, keeps what is published here until it has been received;
+            without one the connection to the clock does so, which lasts as long as the run.
     """
     client = ClockClient(context, role, start["address"], start["secret"], is_watched=life is None)
     try:

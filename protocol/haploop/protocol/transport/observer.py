@@ -17,13 +17,13 @@ _REPORT_S = 0.2
 
 
 class Observer:
-    """Joins a running simulation as a lossy node; for one thread, never blocking but in ``wait``.
+    """Joins a running simulation as a lossy node; for use in one thread, blocking only in ``wait``.
 
-    The clock may drop one that was stopped for long (its queue is full then): it joins again by itself and goes on
-    with what is sent from there.
+    The clock may drop an observer that was stopped for long (its queue is full then): the observer joins again by
+    itself and continues with what is sent from then on.
 
     Args:
-        role: under which name the clock lists it.
+        role: name under which the clock lists it.
         listens: roles whose telemetry it receives.
 
     Attributes:
@@ -68,7 +68,7 @@ class Observer:
     def poll(self) -> list[tuple[str, Frame]]:
         """Returns the messages since the last call, (role, message), without waiting.
 
-        Raises Aborted where the run failed, or the clock goes on without this node for good.
+        Raises Aborted where the run failed, or the clock continues without this node for good.
         """
         frames = self._streams.drain()
         self.ended |= {role: frame for role, frame in frames if frame.name == "END"}
@@ -85,7 +85,7 @@ class Observer:
         return frames
 
     def _note_events(self) -> None:
-        """Takes new events; those that the clock repeats after a node has joined again are passed over."""
+        """Takes new events; those that the clock repeats after a node has joined again are skipped."""
         events = self.client.take_events()
         passed = min(self._known_before, len(events))
         self._known_before -= passed

@@ -1,4 +1,4 @@
-"""Prints of the code in a node: kept in a file of the run, every line marked with the node and its tick."""
+"""Printed output of the code in a node: kept in a file of the run, every line marked with the node and its tick."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from typing import Any
 
 
 class NodeOutput(io.TextIOWrapper):
-    """A standard stream that marks lines as they are printed; it stays open when it is closed.
+    """A standard stream that marks lines as they are printed; ``close`` leaves it open.
 
-    Bytes that are no text pass unchanged. A file that takes no more (a full disk) is no error of whoever prints.
+    Bytes that are not text pass unchanged. A file that takes no more (a full disk) is no error for the code that prints.
 
     Attributes:
-        lines: the bytes below; its ``tick`` returns the tick at work, None before there is one.
+        lines: the raw stream below; its ``tick`` returns the tick at work, and is None before there is one.
     """
 
     def __init__(self, role: str, descriptor: int) -> None:
@@ -52,7 +52,7 @@ class _Lines(io.RawIOBase):
 
 
 def keep_prints(role: str, file: Path) -> None:
-    """Sends standard output and error of this process to the end of a file; as they are where it cannot be opened.
+    """Appends standard output and error of this process to a file, or to standard error if it cannot be opened.
 
     The streams have a descriptor of their own: code that closes number 1 or 2 closes no socket that takes its place.
     """
@@ -68,7 +68,7 @@ def keep_prints(role: str, file: Path) -> None:
 
 @contextlib.contextmanager
 def unheard() -> Iterator[None]:
-    """Sends nowhere what is printed meanwhile, by code that has printed it before, in the run that is repeated."""
+    """Discards what is printed meanwhile by code that has already printed it, in the run that is repeated."""
     with (
         Path(os.devnull).open("w", encoding="utf-8") as nowhere,
         contextlib.redirect_stdout(nowhere),
@@ -78,7 +78,7 @@ def unheard() -> Iterator[None]:
 
 
 def mark_ticks(tick: Callable[[], int]) -> None:
-    """Has what this node prints marked with the tick at work from now on."""
+    """Marks what this node prints from now on with the tick at work."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, NodeOutput):
             stream.lines.tick = tick

@@ -1,4 +1,4 @@
-"""Sockets of a run: local files, or TCP with CURVE keys; with options by which nothing is lost, hangs or grows."""
+"""Sockets of a run: local files, or TCP with CURVE keys; with options so that nothing is lost, hangs or grows."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from haploop.protocol.transport.wire import MAX_FRAME_BYTES
 _PORTS = (CLOCK, *(name for process in PROCESSES.values() for name in process.binds.values()))
 # A subscriber this many blocks behind starts to lose blocks; the grant window keeps lossless ones far below.
 TELEMETRY_BACKLOG_BLOCKS = 256
-# What comes in at sockets that are bound, where anyone may connect, is small: reports and commands, subscriptions to a
-# role. (A large scene goes out, from there to sockets that connect.)
+# Messages that arrive at bound sockets, where anyone may connect, are small: reports and commands, subscriptions to a
+# role. (A large scene goes the other way, from bound sockets to those that connect.)
 _LARGEST: dict[int, int] = {zmq.ROUTER: 4 * 1024 * 1024, zmq.XPUB: 1024}
 _OPTIONS: dict[int, tuple[tuple[int, int], ...]] = {
     zmq.ROUTER: ((zmq.ROUTER_MANDATORY, 1),),
     zmq.XPUB: ((zmq.SNDHWM, TELEMETRY_BACKLOG_BLOCKS), (zmq.XPUB_VERBOSE, 1)),
     zmq.SUB: ((zmq.RCVHWM, TELEMETRY_BACKLOG_BLOCKS),),
 }
-# A peer that has connected must have shown its key by then.
+# A peer that has connected must show its key within this time.
 _HANDSHAKE_MS = 10_000
-# A plain number: the bits of an enumeration take as long as the question itself.
+# A plain int: testing the bits of an enumeration takes as long as the query itself.
 _POLLIN = int(zmq.POLLIN)
 # The kernel's limit on the path of an ipc socket.
 _LONGEST_PATH = 107
@@ -44,10 +44,10 @@ class Transport:
 
     Attributes:
         host: numeric address that TCP sockets are bound to; None for local (ipc) sockets.
-        port: that of the clock, the other sockets of a run take those that follow; 0 for any that are free.
+        port: port of the clock; the other sockets of a run take those that follow. 0 for any free ports.
         keys: those of the program whose sockets these are; None for sockets that anyone may connect to.
-        directory: of the keys of a whole run, for its launcher alone.
-        patience_s: after so long without a sign of life a connection to another host is given up; 0 for never.
+        directory: directory of the keys of a whole run, for its launcher alone.
+        patience_s: time without a sign of life after which a connection to another host is given up; 0 for never.
     """
 
     host: str | None = None
@@ -58,7 +58,7 @@ class Transport:
 
     @property
     def linger_s(self) -> float:
-        """Returns how long what was said last is given to go out, s: a network may lose some of it at first."""
+        """Returns how long the last messages are given to go out, s: a network may lose some of them at first."""
         return 5.0 if self.host else 1.0
 
     @classmethod
@@ -66,9 +66,9 @@ class Transport:
         """Makes the transport of a launcher that a command's options ask for: ADDRESS or ADDRESS:PORT, and keys.
 
         Raises:
-            TransportError: a host that others can reach without keys, no address of this machine, a port that is
-                taken, or keys without TCP.
-            KeysError: keys that are not there, not whole, or open to others.
+            TransportError: a host that others can reach without keys, an address that is not of this machine, a port
+                that is taken, or keys without TCP.
+            KeysError: keys that are missing, incomplete, or open to others.
         """
         from haploop.protocol.transport.addresses import TransportError, address_to_bind
 
@@ -84,7 +84,8 @@ class Transport:
         """Returns the transport of one of the run's processes: its own certificate, and an address on its host.
 
         Args:
-            elsewhere: perhaps on another host, of which any address serves; without keys it can only be this one.
+            elsewhere: whether it is perhaps on another host, where any address will do; without keys it can only be
+                on this one.
 
         Raises:
             KeysError: the certificate is gone.
@@ -98,7 +99,7 @@ class Transport:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns what a process is told at its start; the launcher's directory of keys is no part of it."""
+        """Returns what a process is told at its start; the launcher's directory of keys is not part of it."""
         keys = self.keys and self.keys.as_dict()
         return {"host": self.host, "port": self.port, "keys": keys, "patience_s": self.patience_s}
 
@@ -116,7 +117,7 @@ class SecureContext(zmq.Context[zmq.Socket[bytes]]):
 
     @classmethod
     def from_transport(cls, transport: Transport) -> SecureContext:
-        """Makes a context; with keys, only peers that hold one that is known can connect to its bound sockets."""
+        """Makes a context; with keys, only peers that hold a known key can connect to its bound sockets."""
         context = cls()
         context.transport = transport
         if transport.keys and transport.host:
@@ -128,13 +129,13 @@ class SecureContext(zmq.Context[zmq.Socket[bytes]]):
         return context
 
     def watch(self, socket: zmq.Socket[bytes], events: int) -> zmq.Socket[bytes]:
-        """Returns a socket that tells of events of another's connections, (event, value) as 2 and 4 bytes."""
+        """Returns a socket that reports events of the connections of ``socket``, (event, value) as 2 and 4 bytes."""
         self._watched = *(one for one in self._watched if not one.closed), socket
         return socket.get_monitor_socket(events)
 
     def destroy(self, linger: int | None = None) -> None:
         """Stops the authenticator, closes all sockets and ends the context."""
-        for socket in self._watched:  # one that still told of events would wait for whom it tells, for ever
+        for socket in self._watched:  # one that still reported events would wait for a receiver for ever
             if not socket.closed:
                 socket.disable_monitor()
         self._watched = ()
@@ -178,7 +179,7 @@ def bare_send(socket: zmq.Socket[bytes]) -> Callable[..., Any]:
 def send_at_once(socket: zmq.Socket[bytes], frame: bytes) -> bool:
     """Sends a frame if that can be done at once; tells whether it could.
 
-    A socket that has connected to another's keys is soon connected to nothing, and a send would wait for ever.
+    A socket that has connected to a peer with other keys is soon connected to nothing; a send would wait for ever.
     """
     try:
         socket.send(frame, zmq.DONTWAIT)
@@ -192,7 +193,7 @@ def transport_of(context: zmq.Context[zmq.Socket[bytes]]) -> Transport:
 
 
 def _watch_peers(socket: zmq.Socket[bytes], patience_s: float) -> None:
-    """Has the library give up a connection of which nothing is heard, and one that never says who it is."""
+    """Makes the library give up a connection on which nothing is heard, and one that never says who it is."""
     if patience_s:
         milliseconds = max(2, int(patience_s * 1000))
         asks_ms = min(1000, milliseconds // 2)
@@ -203,7 +204,7 @@ def _watch_peers(socket: zmq.Socket[bytes], patience_s: float) -> None:
 
 
 def connect(socket: zmq.Socket[bytes], address: str, key: str | None = None) -> None:
-    """Connects to an address, whose holder has the public key ``key``: that of the clock where None is given."""
+    """Connects to an address whose holder has the public key ``key``; None stands for the clock's key."""
     keys = transport_of(socket.context).keys
     if keys:
         socket.curve_serverkey = (key or keys.clock).encode()
@@ -248,7 +249,7 @@ def bind(socket: zmq.Socket[bytes], directory: Path, name: str) -> str:
 
 
 def with_host_of(address: str, other: str) -> str:
-    """Returns an address that is bound at every one of its host as whoever has reached ``other`` there reaches it."""
+    """Returns a bound address, with the host of ``other`` in place of a wildcard, for one who has reached ``other``."""
     for wildcard in ("tcp://0.0.0.0:", "tcp://[::]:"):
         if address.startswith(wildcard):
             return f"{other.rpartition(':')[0]}:{address.removeprefix(wildcard)}"

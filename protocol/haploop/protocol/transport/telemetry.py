@@ -13,7 +13,7 @@ from haploop.protocol.transport.wire import Frame, Message, WireError, decode, e
 
 # A block of telemetry: from_tick, ticks, columns and what its sender adds (messages.py).
 Block = Message
-# Requests taken at one block boundary, so that nobody who floods a publisher can hold its node up.
+# Most requests taken at one block boundary, so that flooding a publisher cannot hold its node up.
 _AT_ONCE = 200
 
 
@@ -92,7 +92,7 @@ class Subscriber:
 
     @property
     def slowest(self) -> str:
-        """The publisher of which least has come."""
+        """The publisher from which the least has arrived."""
         return min(self.gaps, key=lambda role: self._next_tick.get(role, -1))
 
     def register(self, poller: zmq.Poller) -> None:

@@ -17,7 +17,7 @@ Message = dict[str, Any]
 
 
 class WireError(ValueError):
-    """Raised for a frame that is no message of this version; its text says what is wrong."""
+    """Raised for a frame that is not a message of this version; its text says what is wrong."""
 
 
 class Frame(NamedTuple):
@@ -30,7 +30,7 @@ class Frame(NamedTuple):
         return {name: value for (name, _), value in zip(MESSAGES[self.name].fields, self.fields, strict=True)}
 
 
-# Half a surrogate pair, as in what a plugin raises, is no UTF-8; such a text is carried with its code in place of it.
+# Half a surrogate pair, which a plugin's error may hold, is not UTF-8; the text is sent with its code in its place.
 _packer = msgpack.Packer(autoreset=True, unicode_errors="backslashreplace")
 
 
@@ -42,7 +42,7 @@ def encode(name: str, *fields: Any) -> bytes:
 def decode(data: bytes) -> Frame:
     """Returns the message in a frame.
 
-    Raises WireError where it is not msgpack, another version, an unknown code, or has missing or wrong fields.
+    Raises WireError where it is not msgpack, has another version or an unknown code, or has missing or wrong fields.
     """
     try:
         items = msgpack.unpackb(data, strict_map_key=False)
