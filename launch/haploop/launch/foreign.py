@@ -1,4 +1,4 @@
-"""Programs of others that take the place of a run's plant or controller: what a command line asks for."""
+"""Foreign programs that take the place of a run's plant or controller, as a command line asks for them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
-# Roles that a program of somebody else's can take; the logger is what judges it.
+# Roles that a foreign program can take; the logger is what judges it.
 ROLES = ("plant", "controller")
 WAIT_S = 60.0
 _LONGEST_WAIT_S = 1e6
@@ -20,11 +20,11 @@ class ProgramError(ValueError):
 
 @dataclass(frozen=True)
 class Program:
-    """What takes the place of one of the run's own processes.
+    """A program that takes the place of one of the run's own processes.
 
     Attributes:
         command: as it was given; "" for a program that somebody else starts.
-        words: the command split as a shell splits it; none is ever given to a shell.
+        words: the command split as a shell splits it; no command is ever given to a shell.
     """
 
     role: str
@@ -38,7 +38,7 @@ class Program:
 
     @property
     def label(self) -> str:
-        """The role and its program, for people; of a long command files without their directories."""
+        """The role and its program, for messages; in a long command, files are given without their directories."""
         told = self.command or "external"
         if len(told) > _LONGEST_TOLD:
             told = " ".join(PurePath(word).name if word.startswith("/") else word for word in self.words)
@@ -53,7 +53,7 @@ def seat_file(role: str) -> str:
 
 
 def described(told: Mapping[str, str]) -> str:
-    """Returns name, version and command of a program as far as it told them, for people."""
+    """Returns name, version and command of a program, as far as it reported them, for messages."""
     name = " ".join(filter(None, (told["name"], told["version"]))) or "a program without a name"
     return f"{name} ({told['command']})" if told["command"] else name
 
@@ -106,7 +106,7 @@ def _read_node(text: str) -> Program:
 
 
 def check_wait(seconds: float | None) -> float:
-    """Returns the time in s that an external program is awaited; ProgramError where it is no length of time."""
+    """Returns the time in s for which an external program is awaited; ProgramError if it is not a valid duration."""
     if seconds is None:
         return WAIT_S
     if not 0 < seconds <= _LONGEST_WAIT_S or math.isnan(seconds):

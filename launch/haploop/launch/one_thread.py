@@ -1,4 +1,4 @@
-"""One thread for NumPy: matrices here are small, and to start a thread a core takes as long as NumPy itself."""
+"""One thread for NumPy: matrices here are small, and starting one thread per core takes as long as NumPy itself."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB
 
 
 def ask_for_one_thread(environment: MutableMapping[str, str]) -> list[str]:
-    """Asks for one thread in an environment; what the user has asked for stays. Returns the variables that are new."""
+    """Asks for one thread in an environment; variables that the user has set stay. Returns those that are new."""
     new = [name for name in THREADS if name not in environment]
     environment.update(dict.fromkeys(new, "1"))
     return new

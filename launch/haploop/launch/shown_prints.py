@@ -1,4 +1,4 @@
-"""Prints of the nodes on the terminal: the first lines as they come, then few; all of it stands in a file."""
+"""Printed output of the nodes on the terminal: the first lines as they come, then few; a file holds all of it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MOST_BYTES, _LONGEST, _LONGEST_OF_OWN = 65_536, 200, 1000
 
 
 class ShownPrints:
-    """Shows on stderr what is added to a file; a line longer than 200 characters is cut, what is no text replaced."""
+    """Shows on stderr what is added to a file; cuts lines longer than 200 characters, replaces what is not text."""
 
     def __init__(self, file: Path) -> None:
         self._file = file
@@ -25,7 +25,7 @@ class ShownPrints:
         self._told = 0
 
     def look(self, now: float) -> None:
-        """Shows what is new, given the wall time in s; cheap, and no oftener than every 0.1 s."""
+        """Shows what is new, given the wall time in s; cheap, and done no more often than every 0.1 s."""
         if now < self._due:
             return
         self._budget = min(_AT_ONCE, self._budget + (now - self._counted) * _EACH_SECOND)
@@ -38,14 +38,14 @@ class ShownPrints:
             self._skip()
 
     def tell(self, sentences: list[str]) -> None:
-        """Shows what the run itself has to tell, whole, and takes it out of the list; at most some 20 a run."""
+        """Shows the run's own messages, uncut, and empties the list; at most some 20 per run."""
         self._told += len(sentences)
         if self._told <= _AT_ONCE:
             self._show(sentences, longest=_LONGEST_OF_OWN)
         sentences.clear()
 
     def close(self, failed: bool) -> None:
-        """Shows the last lines of a run that failed, of any other what is left to show; removes an empty file."""
+        """Shows the last lines of a run that failed, or what is left to show of any other; removes an empty file."""
         lines, is_all = self._new(ended=True)
         if not is_all:
             self._skip()
@@ -79,7 +79,7 @@ class ShownPrints:
             self._show([f"More was printed than is shown here; all of it stands in {self._file}."])
 
     def _show(self, lines: list[str], longest: int = _LONGEST) -> None:
-        with contextlib.suppress(OSError, ValueError):  # a terminal that is gone ends no run
+        with contextlib.suppress(OSError, ValueError):  # a terminal that is gone must not end the run
             for line in lines:
                 text = line if line.isprintable() else "".join(c if c.isprintable() else "?" for c in line)
                 print(text if len(text) <= longest else f"{text[:longest]} ...", file=sys.stderr)

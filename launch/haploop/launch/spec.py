@@ -1,4 +1,4 @@
-"""The one description of a run, and the directory it writes to: new or empty, with its scene."""
+"""The single description of a run, and the directory it writes to: new or empty, with the run's scene."""
 
 from __future__ import annotations
 
@@ -43,24 +43,24 @@ class RunSpec:
     """A scene ready to run: checked, with its directory made; ``dataclasses.replace`` gives one with other options.
 
     Attributes:
-        kinds: element kinds by name; a plugin reloaded in mid-run adds its kinds.
-        out: the run's directory, made; ``is_new``: it was not there before.
+        kinds: element kinds by name; a plugin reloaded during the run adds its kinds.
+        out: the run's directory, already made; ``is_new``: whether it was not there before.
         attachments: text files for the log, by name.
         plugins: plugin files within ``out`` that the controller loads.
         plugin_sources: kind -> the user's file it came from, for reloading.
-        plugin_files: kind -> the file within ``out`` that it is at work from; a reloaded one changes it.
+        plugin_files: kind -> the file within ``out`` that its code at work is from; a reload changes it.
         pace: simulated seconds per wall second; infinite for as fast as possible. For processes only.
-        clock: who owns the time: ``run``, or ``plant`` where a program in its place keeps it as a device does.
+        clock: who owns the time: ``run``, or ``plant`` where a program in the plant's place keeps it as a device does.
         transport: addresses and keys of the sockets. For processes only.
-        programs: programs of others that take the place of plant or controller, by role; no scene names them. For
+        programs: foreign programs that take the place of plant or controller, by role; no scene names them. For
             processes only.
-        wait_s: how long a program that somebody else starts is awaited, s.
+        wait_s: how long an external program is awaited, s.
         on_progress: called now and then with the logger's status.
-        on_started: called once with the run's id, and the clock's address where that is one of TCP. For processes
-            only.
+        on_started: called once with the run's id, and with the clock's address if that is a TCP address. For
+            processes only.
         on_judging: called when the run is over and is gone through again to be judged. For processes only.
         start_gate: given the pids of all nodes that are ready, returns whether the first tick may be worked on. It is
-            asked again until it says so; for a process that is to be there from the start. For processes only.
+            asked again until it returns true; for a process that must be there from the start. For processes only.
     """
 
     scene: Scene
@@ -85,8 +85,8 @@ class RunSpec:
 def make_output(out: Path | None, scene_path: Path, first: str = SCENE, parent: Path = Path("runs")) -> Path:
     """Makes the run's directory: ``out``, or a new one below ``parent`` named by scene and time.
 
-    It is claimed by making the file ``first``, empty, which its owner writes: of many who start at one instant only one
-    can.
+    The directory is claimed by making the file ``first``, empty, which its owner then writes: of many processes that
+    start at the same instant only one can do so.
 
     Raises OutputError where ``out`` holds something already, or cannot be made.
     """
@@ -120,7 +120,7 @@ def _claimed(out: Path, first: str) -> bool:
 
 
 def discard(out: Path, is_new: bool) -> None:
-    """Removes what a run that never began has put into its directory, and the directory where it was made for it.
+    """Removes what a run that never began has put into its directory, and the directory if it was made for that run.
 
     A directory that holds anything else stays as it is.
     """
@@ -138,7 +138,7 @@ def discard(out: Path, is_new: bool) -> None:
 
 
 def write_scene(scene: Scene, out: Path) -> str:
-    """Writes the resolved scene, which runs by itself; returns its text."""
+    """Writes the resolved scene, which can be run on its own; returns its text."""
     text = to_toml(scene.as_dict())
     try:
         (out / SCENE).write_text(text, encoding="utf-8")
@@ -148,7 +148,7 @@ def write_scene(scene: Scene, out: Path) -> str:
 
 
 def kept_name(path: Path, data: bytes | None = None) -> str:
-    """Returns the name under which a plugin file is kept: its own with its digest, unless that is its name already."""
+    """Returns the name under which a plugin file is kept: its own with its digest, unless it has the digest already."""
     digest = hashlib.sha256(path.read_bytes() if data is None else data).hexdigest()[:12]
     return path.name if path.stem.endswith(f"-{digest}") else f"{path.stem}-{digest}.py"
 
@@ -157,7 +157,7 @@ def keep_plugin(path: Path, out: Path, data: bytes | None = None) -> Path:
     """Copies a plugin file into the run's directory under a name with its digest, so that a replay finds it.
 
     Args:
-        data: what was read of it; it is read anew when None.
+        data: its content if it was read already; None to read it here.
 
     Raises OutputError where it cannot be read or copied.
     """

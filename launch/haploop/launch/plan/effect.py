@@ -1,4 +1,4 @@
-"""An effect: the one object that says all there is to say of something that a scene may name."""
+"""An effect: the single object that completely describes something that a scene may name."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from haploop.protocol.scene.table import Table, Tables
 TableType = TypeVar("TableType", bound=Table)
 Stage = Literal["motion", "measurement", "estimate", "line", "actuation"]
 
-# Modules of the plant that effects bring. These move bodies in a row, or one under forces that change between ticks.
+# Modules of the plant that effects bring. These move a chain of bodies, or one body under forces that change between
+# ticks.
 HISTORY = tuple(f"haploop.plant.chain.{name}" for name in ("history", "chain", "sensed_acceleration", "transition"))
 _EXACT = ("haploop.plant.chain.motion", "haploop.plant.where_it_pays")
 CHAIN = (*_EXACT, *HISTORY)
@@ -34,7 +35,7 @@ class Draft:
     Attributes:
         data: the merged tables as they were given.
         scene: the whole scene, None where some value of it is wrong.
-        valid: returns some data as a table of a kind, None where they are none.
+        valid: returns data as a table of a class, None where they are not valid as one.
         complain: adds a mistake, given its key, a sentence on what is expected and, unless the value is to be quoted,
             what was found.
     """
@@ -59,33 +60,33 @@ def _always(_scene: Scene) -> bool:
 
 @dataclass(frozen=True)
 class Effect:
-    """Something that a scene may name beside device, hand, wall and elements.
+    """Something that a scene may name besides device, hand, wall and elements.
 
     Plan, checks, JSON Schema, ``explain``, ablation, advice, the linear map and batches all ask this object alone.
 
     Attributes:
         key: dotted key of the scene that names it.
         node: the process it acts in.
-        modules: imported for it beside the node's own core; it is written in the first.
+        modules: imported for it besides the node's own core; the effect itself is written in the first.
         stage: when it acts: in the motion, at every plant step; in the measurement, the estimate, on the line to the
             device or in the actuation, once a tick.
-        does: its doing, in one phrase.
-        value: what must stand at the key; None where being there is enough.
+        does: what it does, in one phrase.
+        value: what must stand at the key; None if the presence of the key is enough.
         columns: columns it adds to the log's ``/plant``.
         counts: numbers it adds to the summary, as entry and key.
-        states: numbers it remembers from tick to tick or step to step: a count, or what counts them in a scene.
+        states: how many numbers it remembers from tick to tick or step to step: a count, or a function of a scene.
         linear: whether a loop in contact stays a linear map with it.
-        left_out: keys of it that the map of small and smooth swings in contact has not.
-        batches: whether it takes the same way in every tick whatever its numbers, so that many scenes run as one.
+        left_out: keys of it that the map of small and smooth swings in contact leaves out.
+        batches: whether it takes the same path in every tick whatever its numbers, so that many scenes run as one.
         used: whether a scene that names it simulates it.
-        takes_out: makes of a resolved scene one without it; None where deleting the key does.
-        check: adds the mistakes that no single key of it can show; it is asked of every scene.
-        note: sentences on what is in order in a resolved scene that names it, but may not have been meant.
-        frees: cause of a buzzing contact, such as "friction" -> makes of a resolved scene that simulates the effect one
-            with the ideal in its place, or gives back the scene itself where its values are ideal.
-        scaled_with: quantity that may be uncertain, such as "device mass" -> key of the effect that goes with it.
+        takes_out: turns a resolved scene into one without it; None if deleting the key is enough.
+        check: adds the mistakes that no single key of it can show; it is called for every scene.
+        note: sentences on what is valid in a resolved scene that names it, but may not have been meant.
+        frees: cause of a buzzing contact, such as "friction" -> turns a resolved scene that simulates the effect into
+            one with the ideal in its place, or returns the scene itself if its values are ideal.
+        scaled_with: quantity that may be uncertain, such as "device mass" -> key of the effect that scales with it.
         table: declaration of its table, for an effect of another package; the scene itself declares the others. The
-            force of one that pushes is named in the group of entry points ``haploop.forces``.
+            force of an effect that pushes is named in the group of entry points ``haploop.forces``.
     """
 
     key: str
@@ -124,7 +125,7 @@ class Effect:
         return "every plant step" if self.stage == "motion" else "every tick"
 
     def modules_in(self, scene: Scene) -> tuple[str, ...]:
-        """Returns what it imports in a scene: another integrator has its own in place of what moves bodies exactly."""
+        """Returns what it imports in a scene: another integrator has its own modules, not those of exact motion."""
         if scene.clock.integrator == "exact":
             return self.modules
         kept = tuple(module for module in self.modules if module not in (*_EXACT, *RUBBING))
@@ -132,7 +133,7 @@ class Effect:
         return (*kept, motion) if self.key == "friction" else kept
 
     def is_named(self, scene: Scene) -> bool:
-        """Returns whether a resolved scene names it; a number that is 0 names nothing."""
+        """Tells whether a resolved scene names it; a number that is 0 names nothing."""
         found = value_at(scene, self.key)
         return bool(found) if self.value is None else found == self.value
 
@@ -140,7 +141,7 @@ class Effect:
         return self.is_named(scene) and self.used(scene)
 
     def batches_in(self, scene: Scene) -> bool:
-        """Returns whether a scene that names it can be one of many that run as one; one of another package cannot."""
+        """Tells whether a scene that names it can be one of many that run as one; no effect of another package can."""
         if self.table is not None:
             return False
         return self.batches if isinstance(self.batches, bool) else self.batches(scene)
@@ -149,7 +150,7 @@ class Effect:
         return self.states if isinstance(self.states, int) else self.states(scene)
 
     def without(self, scene: Scene) -> Scene:
-        """Returns a resolved scene that names it without it, and without what cannot be there without it."""
+        """Returns a resolved scene that names it, but without it and without what cannot be there in its absence."""
         return self.takes_out(scene) if self.takes_out else without(scene, self.key)
 
 

@@ -1,6 +1,6 @@
-"""The one table of effects: all that a scene may name beside device, hand, wall and elements.
+"""The single table of effects: all that a scene may name besides device, hand, wall and elements.
 
-An effect that is not named is not there: its modules are not imported and no instruction is spent on it.
+An effect that is not named is absent: its modules are not imported and no instruction is spent on it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def _plant(module: str, *others: str) -> tuple[str, ...]:
 
 
 def _integrators() -> Iterator[Effect]:
-    """Makes the effects of all methods of ``clock.integrator`` but the exact transition."""
+    """Makes the effects of all methods of ``clock.integrator`` except the exact transition."""
     for name in integrator_names():
         if name != "exact":
             method = find_integrator(name)
@@ -49,7 +49,7 @@ def _integrators() -> Iterator[Effect]:
                 "motion",
                 f"every step is {method.does}",
                 value=name,
-                # The map of a fixed step is not that of the loop; that of an exact method is.
+                # The map of a fixed-step method is not that of the loop; the map of an exact method is.
                 linear=method.is_exact,
                 batches=False,
                 note=rules.note_growth,
@@ -57,7 +57,7 @@ def _integrators() -> Iterator[Effect]:
 
 
 def _estimators(of: str, names: Container[str] | None = None) -> Iterator[Effect]:
-    """Makes the effects of the estimators that a table may name, but for the backward difference."""
+    """Makes the effects of the estimators that a table may name, except the backward difference."""
     for name, kind in estimators_for(of).items():
         if name in names if names is not None else name != "difference":
             yield Effect(
@@ -74,7 +74,7 @@ def _estimators(of: str, names: Container[str] | None = None) -> Iterator[Effect
 
 
 def _memory_of(of: str, scene: Scene) -> int:
-    """Counts the numbers that an estimator remembers; counts of ticks are none of them."""
+    """Counts the numbers that an estimator remembers; counts of ticks are not among them."""
     named = scene.estimate(of).estimator or "difference"
     estimator = estimator_class(named).from_scene(scene, of, Timebase.from_scene(scene).period_s)
     return sum(isinstance(leaf, float) for leaf in tree_leaves(estimator.start(0.0, (0.0, 0.0))))
@@ -180,9 +180,9 @@ def effects_of(scene: Scene) -> tuple[Effect, ...]:
 
 
 def notes(scene: Scene, kinds: Mapping[str, type[Element]] | None = None) -> list[Note]:
-    """Returns what is in order in a resolved scene, but may not be what was meant; one sentence each.
+    """Returns notes on what is valid in a resolved scene, but may not have been meant; one sentence each.
 
-    ``kinds`` are those of its elements; nothing is said of these without.
+    ``kinds`` are those of its elements; without them nothing is said about the elements.
     """
     of_effects = [
         Note(note, effect.key) for effect in all_effects() if effect.is_named(scene) for note in effect.note(scene)

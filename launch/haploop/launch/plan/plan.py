@@ -29,13 +29,13 @@ class Step:
 
 @dataclass(frozen=True)
 class Plan:
-    """A scene, decided.
+    """What a scene comes to.
 
     Attributes:
         bodies: name -> mass in kg, from the actuator to the hand.
         states: what is integrated from plant step to plant step.
-        memory: numbers that effects remember beside it from tick to tick, by the effect's name.
-        modules: node -> what its effects import beside its core.
+        memory: how many numbers effects remember besides the states, from tick to tick, by the effect's name.
+        modules: node -> what its effects import besides its core.
         columns: channel of the log -> its columns, time stamps aside.
     """
 
@@ -78,10 +78,10 @@ def plan(scene: Scene) -> Plan:
 
 
 def multiplications(scene: Scene) -> int:
-    """Multiplications that move the bodies through one tick: every state by every state, command and friction.
+    """Counts multiplications that move the bodies through one tick: each state by each state, command and friction.
 
-    One mass is moved once a hold and filled in at the plant steps; bodies in a row are moved to every plant step. The
-    classical Runge-Kutta method moves them four times; of DOP853 twelve times a tick are counted, the least there is.
+    One mass is moved once per hold and filled in at the plant steps; a chain of bodies is moved to every plant step.
+    The classical Runge-Kutta method moves them four times; DOP853 counts as twelve times per tick, the least there is.
     """
     time, size = Timebase.from_scene(scene), len(Chain.from_scene(scene).states)
     if needs_chain(scene):

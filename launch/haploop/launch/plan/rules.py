@@ -1,4 +1,4 @@
-"""The rules of effects: checks, notes on scenes that are in order, and scenes with the ideal in place of an effect."""
+"""The rules of effects: checks, notes on valid scenes, and scenes with the ideal in place of an effect."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from haploop.protocol.ticks import whole_count
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-# What rounding adds to the factor 1 of a body that drifts.
+# What rounding may add to the growth factor, which is 1 for a body that drifts.
 _ROUNDING = 1e-7
 
 
 def check_friction(draft: Draft) -> None:
     """Refuses a Stribeck law that does not fall, and a plant rate too low for friction.
 
-    Too low is one at which thousands of parts of a step would have to be followed, or at which a method's step does
-    not brake.
+    A rate is too low if thousands of parts of a step would have to be followed, or if a step of the method does not
+    brake.
     """
     friction = draft.table("friction", Friction)
     if friction is None:
@@ -65,7 +65,7 @@ def _check_rate(draft: Draft, scene: Scene) -> None:
 
 
 def check_grip(draft: Draft) -> None:
-    """Refuses a grip that holds no mass; the mass is read alone, whatever else is wrong with ``[hand]``."""
+    """Refuses a grip that holds no mass; the mass is read separately, whatever else is wrong with ``[hand]``."""
     hand = draft.data.get("hand")
     if not isinstance(hand, dict) or "grip" not in hand:
         return
@@ -81,7 +81,7 @@ def check_actuator(draft: Draft) -> None:
 
 
 def check_accelerometer(draft: Draft) -> None:
-    """Refuses counts larger than the range, and an age of readings of no whole number of plant steps."""
+    """Refuses counts larger than the range, and an age of readings that is not a whole number of plant steps."""
     table = draft.table("accelerometer", Accelerometer)
     if table is None:
         return
@@ -120,7 +120,7 @@ def note_accelerometer(scene: Scene) -> list[str]:
 
 
 def note_growth(scene: Scene) -> list[str]:
-    """Says where a method of a fixed step makes the bodies swing ever wider by itself."""
+    """Returns a note if a fixed-step method by itself makes the bodies swing ever wider."""
     clock = scene.clock
     if find_integrator(clock.integrator).method is None:
         return []
@@ -136,7 +136,7 @@ def note_growth(scene: Scene) -> list[str]:
 
 
 def note_order(scene: Scene, kinds: Mapping[str, type[Element]]) -> list[str]:
-    """Tells of elements that change what stands before them and are not the last."""
+    """Returns a note on each element that changes what stands before it and is not the last."""
     names = [table.name for table in scene.dissipation]
     return [
         f"dissipation.{place} ({name}) changes the force of the wall and of what stands before it; "
@@ -147,7 +147,7 @@ def note_order(scene: Scene, kinds: Mapping[str, type[Element]]) -> list[str]:
 
 
 def unrounded(scene: Scene) -> Scene:
-    """Takes out the counts of encoder and accelerometer; estimators go on trusting positions as before."""
+    """Removes the counts of encoder and accelerometer; estimators continue to trust positions as before."""
     velocity = scene.velocity
     if velocity and scene.encoder:
         one_count = scene.encoder.resolution
@@ -159,7 +159,7 @@ def unrounded(scene: Scene) -> Scene:
 
 
 def noiseless(scene: Scene) -> Scene:
-    """Takes the noise out of an accelerometer; the scene itself where there is none."""
+    """Removes the noise of an accelerometer; returns the scene itself if there is none."""
     return without(scene, "accelerometer.noise_density") if value_at(scene, "accelerometer.noise_density") else scene
 
 

@@ -1,4 +1,4 @@
-"""The scenes, devices, hands and sweeps that come with haploop, found by name wherever one is."""
+"""The scenes, devices, hands and sweeps that come with haploop, found by name from any directory."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FOLDERS = ("scenes", "devices", "hands", "sweeps")
 
 
 def bundled_folder(folder: str) -> Path:
-    """Returns one of ``FOLDERS``: in a wheel inside haploop.launch, in a checkout beside it."""
+    """Returns the path of one of ``FOLDERS``: in a wheel inside haploop.launch, in a checkout beside it."""
     package = Path(haploop.launch.__path__[0])
     inside = package / folder
     return inside if inside.is_dir() else package.parents[1] / folder
@@ -26,7 +26,7 @@ def bundled(folder: str) -> dict[str, Path]:
 
 
 def of_name(name: str, folder: str) -> Path | None:
-    """Returns the bundled file of a name, which may have its suffix and its folder, as in a checkout, too.
+    """Returns the bundled file of a name, which may include its suffix and its folder, also as in a checkout.
 
     ``premium15``, ``devices/premium15.toml`` and ``launch/devices/premium15.toml`` are the same.
     """
@@ -35,7 +35,7 @@ def of_name(name: str, folder: str) -> Path | None:
 
 
 def found(path: Path, folder: str, beside: Path = Path()) -> Path:
-    """Returns one's own file if there is one, relative to ``beside``, else the bundled one of this name.
+    """Returns the user's own file if there is one, relative to ``beside``, else the bundled file of this name.
 
     Either may be named without its suffix.
     """
@@ -47,9 +47,9 @@ def found(path: Path, folder: str, beside: Path = Path()) -> Path:
 
 
 def like(name: str, folder: str, beside: Path = Path()) -> str | None:
-    """Returns what a name that is none may have been meant for: a bundled one, or a file of one's own ``beside`` it.
+    """Returns what an unknown name may have been meant for: a bundled file, or a file of the user's in ``beside``.
 
-    The nearest counts, else the first that begins as it does.
+    The nearest counts, else the first that begins with the name.
     """
     own = {path.stem: path.name for path in sorted(beside.glob("*.toml"))}
     names = {one: one for one in bundled(folder)} | own
@@ -58,7 +58,7 @@ def like(name: str, folder: str, beside: Path = Path()) -> str | None:
 
 
 def own_file(name: str, folder: str) -> Path | None:
-    """Returns the file of one's own that is taken here in place of a bundled one, None for none."""
+    """Returns the user's own file that is taken here in place of a bundled one; None if there is none."""
     bundled_one = of_name(name, folder)
     for path in (Path(name), Path(folder, name)):
         file = found(path, folder)
@@ -68,7 +68,7 @@ def own_file(name: str, folder: str) -> Path | None:
 
 
 def taken_instead(name: str, folder: str) -> Path | None:
-    """Returns the file of one's own that a bare name stands for, though one of that name comes with haploop."""
+    """Returns the user's own file that a bare name stands for, although one of that name comes with haploop."""
     bundled_one, file = of_name(name, folder), found(Path(name), folder)
     if bundled_one is None or name.endswith(".toml") or os.path.samefile(file, bundled_one):  # noqa: PTH121
         return None

@@ -30,13 +30,13 @@ from haploop.protocol.ticks import Timebase, TimebaseError
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-# Where the key ``kind`` says what else is in a table; a number stands for any.
+# Tables in which the key ``kind`` says what else is in them; a number stands for any.
 _TAGGED = {("hand", "force"), ("jitter",), ("dissipation", 0), ("event", 0, "swap")}
-# What may be no mistake once the file is there that lacks.
+# What may not be a mistake once the missing file is there.
 _ELSEWHERE = ("missing", "union_tag_not_found")
 _SOME_S = 1.0
 _OWN_KIND = " {} of yours comes with --plugin FILE."
-# What a file of one's own may bring, by the last keys of where it is named.
+# What a plugin file may bring, by the last keys of the place where it is named.
 _OWN: dict[KeyPath, str] = {
     ("wall", "kind"): "A wall",
     ("velocity", "estimator"): "An estimator",
@@ -64,8 +64,8 @@ def resolve(layers: Layers, kinds: Mapping[str, type[Element]]) -> Scene:
 
 
 def validated(layers: Layers, tables: Tables, kinds: Mapping[str, type[Element]]) -> Scene | None:
-    """Returns a scene of some tables of ``layers``; None where values are not in order, which it complains of."""
-    with suppress(ValidationError):  # what is wrong, the model of the whole scene says
+    """Returns a scene of some tables of ``layers``; None if values are invalid, which it adds to the mistakes."""
+    with suppress(ValidationError):  # the model of the whole scene says what is wrong
         return _read(tables, scene_model(kinds, tables))
     try:
         return _read(tables, scene_model(kinds))
@@ -84,11 +84,11 @@ def _read(tables: Tables, model: type[Model]) -> Scene:
 
 
 def with_rules(layers: Layers, scene: Scene | None, kinds: Mapping[str, type[Element]]) -> Scene:
-    """Returns a scene after the rules between keys: its events with what they set read.
+    """Returns a scene after applying the rules between keys, with the values that its events set read.
 
     Args:
         layers: the tables of the scene.
-        scene: each value of it in order by itself; None where one is not, which is a mistake of ``layers`` already.
+        scene: a scene whose values are each valid alone; None if one is not, which is a mistake of ``layers`` already.
 
     Raises:
         SceneError: all mistakes, those already known to ``layers`` included.
@@ -121,8 +121,8 @@ def resolve_event(event: Tables, scene: Scene, kinds: Mapping[str, type[Element]
     """Returns an event that comes in during a run, resolved, after the events of the resolved ``scene``.
 
     Raises:
-        SceneError: it does not fit the scene, or an event that is still to come no longer would. Keys of its own are
-            told as they were given, without their place in the scene.
+        SceneError: it does not fit the scene, or an event that is still to come would then no longer fit. The event's
+            own keys are reported as they were given, without their place in the scene.
     """
     events = [*(known.as_dict() for known in scene.event), event]
     layers = Layers(Path("the run with this change"), {**scene.as_dict(), "event": events})
@@ -133,7 +133,7 @@ def resolve_event(event: Tables, scene: Scene, kinds: Mapping[str, type[Element]
 
 
 def _as_asked(mistake: Mistake, event: str) -> Mistake:
-    """Returns a mistake of one event without its place in the scene; one of anything else as it is."""
+    """Returns a mistake of one event without its place in the scene; a mistake of anything else unchanged."""
     if mistake.key == event:
         return replace(mistake, file="", key="what was asked for")
     if not mistake.key.startswith(f"{event}."):
@@ -144,7 +144,7 @@ def _as_asked(mistake: Mistake, event: str) -> Mistake:
 
 
 def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:
-    """Returns the integers of the run; None when there are none, which is a mistake here unless it is one already."""
+    """Returns the integers of the run; None if there are none, which is added as a mistake unless it is one already."""
     table = scene.clock if scene else read_table(Clock, layers.data.get("clock", {}))
     try:
         duration = scene.duration if scene else number_of(Scene, "duration").read(layers.data.get("duration"))
@@ -152,7 +152,7 @@ def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:
         duration = None
     if table is None:
         return None
-    try:  # a clock is checked by itself where the duration is none: a second is a whole number of ticks of any
+    try:  # without a duration the clock alone is checked: a second is a whole number of ticks at any rate
         time = Timebase.from_clock(table, _SOME_S if duration is None else duration)
         return None if duration is None else time
     except TimebaseError as error:
@@ -165,7 +165,7 @@ def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:
         return None
 
 
-# What is said by other keys than data sheets say it by.
+# What a scene says by other keys than data sheets use.
 _COUNTS = ' 4096 counts over 0.2 m are bits = 12 and range = "0.2 m", or resolution = "0.2 m / 4096".'
 _FORCE = (
     " The force is cut off at saturation at every instant, however long: put there the peak force for taps, the "
@@ -218,7 +218,7 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
 
 
 def _heading(layers: Layers, schema: Schema, table: KeyPath, keys: list[str]) -> str:
-    """Asks after a missing heading where all strange keys of a table are those of one absent table; "" elsewhere."""
+    """Asks after a missing heading if all unknown keys of a table are those of one absent table; "" otherwise."""
     strange = layers.value(table).keys() - keys
     absent = schema["properties"].keys() - layers.data.keys()
     homes = [name for name in absent if strange <= schema_at(schema, (name,), {}).get("properties", {}).keys()]
@@ -230,7 +230,7 @@ def _is_list_of_tables(value: object) -> bool:
 
 
 def _complain_of_keys(layers: Layers, table: KeyPath, schema: Schema, rule: Schema) -> None:
-    """Adds a mistake for every key of a table without a known kind that no kind has."""
+    """Adds a mistake for every key that no kind has, of a table without a known kind."""
     keys = keys_of_all(schema, rule)
     for name in layers.value(table):
         if name not in keys:
@@ -241,7 +241,7 @@ def _complain_of_keys(layers: Layers, table: KeyPath, schema: Schema, rule: Sche
 
 
 def _of_a_device(layers: Layers, key: KeyPath) -> str:
-    """Returns what to do with a file that describes a device and no task; nothing for another."""
+    """Returns what to do with a file that describes a device and no task; "" for any other file."""
     if key != ("duration",) or not layers.data.keys().isdisjoint({"wall", "hand", "dissipation"}):
         return ""
     name = Path(layers.path).name

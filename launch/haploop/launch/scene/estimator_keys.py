@@ -16,7 +16,7 @@ _TABLES: dict[str, type[Table]] = {"velocity": Velocity, "acceleration": Acceler
 
 
 def check_estimators(layers: Layers) -> None:
-    """Adds keys an estimator lacks or does not take to the mistakes; values wrong in themselves are passed over."""
+    """Adds to the mistakes the keys that an estimator lacks or does not take; skips values wrong in themselves."""
     velocity, acceleration = _table(layers, "velocity"), _table(layers, "acceleration")
     _keys(layers, "velocity", velocity)
     _keys(layers, "acceleration", acceleration)
@@ -26,7 +26,7 @@ def check_estimators(layers: Layers) -> None:
 
 
 def check_filter(layers: Layers, scene: Scene) -> None:
-    """Adds a jerk density for which no filter can be computed to the mistakes of a scene that is else in order."""
+    """Adds to the mistakes of an otherwise valid scene a jerk density for which no filter can be computed."""
     if scene.velocity is None or scene.velocity.jerk_density is None:
         return
     from haploop.controller.estimators.kalman import jerk_density_limits, position_noise_m
@@ -41,7 +41,7 @@ def check_filter(layers: Layers, scene: Scene) -> None:
 
 
 def _keys(layers: Layers, name: str, table: Tables) -> None:
-    """Compares the keys of a table with those that the estimators declare that may stand in it."""
+    """Compares the keys of a table with those that its possible estimators declare."""
     kinds, estimator = estimators_for(name), table.get("estimator", "difference")
     if not isinstance(estimator, str) or (kind := kinds.get(estimator)) is None:
         return
@@ -63,9 +63,9 @@ def _keys(layers: Layers, name: str, table: Tables) -> None:
 
 
 def _gives(layers: Layers, source: str) -> bool:
-    """Tells whether a default can be taken from a table; from one of noise only where there is some.
+    """Tells whether a default can be taken from a table; from that of noise only if there is some noise.
 
-    A deviation that is wrong is a mistake reported elsewhere.
+    A wrong deviation is a mistake that is reported elsewhere.
     """
     if source != "noise":
         return source in layers.data

@@ -105,7 +105,7 @@ def settable_keys(
 
 
 def _wall_of(layers: Layers) -> type[WallLaw] | None:
-    """Returns the kind of the scene's wall; a spring for a kind that there is not, a mistake reported elsewhere."""
+    """Returns the kind of the scene's wall; a spring for an unknown kind, which is a mistake reported elsewhere."""
     table = layers.data.get("wall")
     if not isinstance(table, dict):
         return None
@@ -144,14 +144,14 @@ def _setting(
 
 
 def _fixed(name: str, settable: dict[str, Number]) -> str:
-    """Returns a sentence on the table of a key where it is one of a scene of which nothing changes in a run."""
+    """Returns a sentence on the table of a key if it is one of the scene in which a run changes nothing; else ""."""
     table = name.partition(".")[0]
     is_fixed = table != name and hasattr(Scene, table) and not any(key.startswith(f"{table}.") for key in settable)
     return f"Nothing of [{table}] changes in a run. " if is_fixed else ""
 
 
 def _nearest_key(name: str, settable: dict[str, Number]) -> str | None:
-    """Returns the key closest to ``name``: by its last part where the table is right, since long names begin alike."""
+    """Returns the key closest to ``name``: by its last part if the table is right, since long names begin alike."""
     if _fixed(name, settable):
         return None
     table, _, last = name.rpartition(".")
@@ -182,7 +182,7 @@ def swapped_in(events: Iterable[EventTable]) -> list[ElementTable]:
 
 
 def try_out(tables: Iterable[ElementTable], kinds: Mapping[str, type[Element]]) -> None:
-    """Makes each element once, since its own code may refuse what its declaration allows, with an ElementError."""
+    """Makes each element once, since its own code may refuse with an ElementError what its declaration allows."""
     for table in tables:
         make_element(table, kinds)
 

@@ -35,7 +35,7 @@ def load(
         path: the scene file.
         overrides: ``KEY=VALUE`` with dotted keys, laid over what the file says.
         kinds: the dissipation elements at hand, by kind; the installed ones when None.
-        any_hand: whether its hand may be unmodelled: nothing here moves such a scene.
+        any_hand: whether its hand may be unmodelled; nothing here moves such a scene.
 
     Raises:
         SceneError: the scene cannot be run; it holds every mistake.
@@ -54,7 +54,7 @@ def resolved(
 
     Raises:
         SceneError: the scene cannot be run; it holds every mistake.
-        PluginError: what it names of a plugin file gives no number.
+        PluginError: something that it names from a plugin file does not give a number.
     """
     if "axes" in layers.data:
         layers.complain(("axes",), _A_SWEEP.format(layers.path), "is a key of a sweep, not of a scene")
@@ -75,9 +75,9 @@ def resolved(
 
 
 def places(path: Path, overrides: Sequence[str], keys: Sequence[str]) -> list[str]:
-    """Returns where keys of the resolved scene of a file stand, ``FILE:LINE``; "" for one that stands in no file.
+    """Returns where keys of a file's resolved scene stand, as ``FILE:LINE``; "" for one that stands in no file.
 
-    A file that has gone, or is another by now, has none of them.
+    A file that is gone, or is another by now, has none of them.
     """
     try:
         layers = read_layers(path)

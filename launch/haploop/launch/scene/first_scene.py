@@ -47,18 +47,18 @@ stiffness = {wall}
 
 
 class FirstSceneError(ValueError):
-    """A wall that is no stiffness, or a device or hand that is no file and does not come with haploop."""
+    """A wall that is not a stiffness, or a device or hand that is not a file and does not come with haploop."""
 
 
 def first_scene(device: str, hand: str, wall: str | None, folder: Path) -> str:
     """Returns a scene in which a hand moves a device into a wall and holds it there.
 
-    What the files of device and hand say of the rest stands in it as a comment, so that it is not said anew.
+    What the files of device and hand say about the rest is written as comments, so that the scene does not repeat it.
 
     Args:
-        device, hand: names that ``haploop scenes`` lists, or paths of files of one's own.
-        wall: stiffness with its unit; None for that of the files, 0.5 N/mm without one.
-        folder: where the scene will be; files of one's own are named from there.
+        device, hand: names that ``haploop scenes`` lists, or paths of the user's own files.
+        wall: stiffness with its unit; None for that of the files, or 0.5 N/mm if they have none.
+        folder: where the scene will be; the user's own files are named relative to it.
 
     Raises:
         FirstSceneError: what was given cannot be used; the message says what would do.
@@ -91,7 +91,7 @@ def first_scene(device: str, hand: str, wall: str | None, folder: Path) -> str:
 
 
 def _left_to_files(text: str, said: Layers) -> str:
-    """Returns the text with every key as a comment that the files say; all of a table that names another kind there."""
+    """Returns the text with each key that the files give, and all keys of a table whose kind they name, as comments."""
     lines, table, at = list[str](), (), _table(said, ())
     for line in text.splitlines():
         if header := re.fullmatch(r"\[([\w.]+)\].*", line):

@@ -1,4 +1,4 @@
-"""Mistakes of a scene, told in full sentences and all at once."""
+"""Mistakes of a scene, reported in full sentences and all at once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 COMMAND_LINE = "--set"
-# So many mistakes are told; who has more has one that makes the others.
+# At most this many mistakes are reported; if there are more, one of them causes the others.
 _MOST_TOLD = 50
 
 
@@ -18,12 +18,12 @@ class Mistake:
     """One mistake.
 
     Attributes:
-        file: the scene file that made it, or ``"--set"``; "" where nobody need be told.
+        file: the scene file that made it, or ``"--set"``; "" if it need not be named.
         key: dotted key, such as ``dissipation.0.mass``; empty when the file as a whole is wrong.
         given: what was found there ("is -3.0", "is missing", "is not a key of [wall]").
         expected: what is allowed, a full sentence.
         nearest: the allowed name that comes nearest to the one given.
-        line: of the file, from 1; None where it has none, as what --set gives.
+        line: line of the file, from 1; None if there is none, as for what --set gives.
     """
 
     file: str

@@ -36,12 +36,12 @@ class Model(BaseModel):
 
 TableType = TypeVar("TableType", bound=Table)
 _SPRING_KEYS = {"position", "stiffness", "occupies"}
-# Of a model that is to be made: key -> (type, default).
+# Keys of a model to be made: key -> (type, default).
 Keys = dict[str, Any]
 
 
 class FunctionOfTime(Model):
-    """Points whose times rise."""
+    """Points whose times increase."""
 
     @model_validator(mode="after")
     def _times_rise(self) -> FunctionOfTime:
@@ -62,7 +62,7 @@ def model_of(table: type[Table]) -> type[Model]:
 
 
 def _keys_of(table: type[Table], others: Keys, named: frozenset[str] | None = None) -> Keys:
-    """Makes the keys of a table, those that have a default only where they are named, if any are."""
+    """Makes the keys of a table; if ``named`` is given, those with a default only if they are in it."""
     keys: Keys = {"kind": (Literal[table.kind], ...)} if table.kind else {}
     hints = get_type_hints(table, include_extras=True)
     for field in table.fields():
@@ -137,8 +137,8 @@ def scene_model(kinds: Mapping[str, type[Element]], named: Mapping[str, Any] | N
     """Makes the model of the scene, with the kinds of dissipation element that are at hand.
 
     Args:
-        named: the tables that are there: the model takes what that of the whole scene would take, and is made sooner,
-            without other walls than the spring where it is one, and without other elements than are in them.
+        named: the tables that are there: the model accepts what that of the whole scene would accept, and is made
+            faster, without walls other than the spring if the wall is one, and without elements other than theirs.
     """
     if named is None:
         return _scene_model(tuple(kinds.items()), None)
@@ -149,7 +149,7 @@ def scene_model(kinds: Mapping[str, type[Element]], named: Mapping[str, Any] | N
 
 
 def _kinds_in(tables: Mapping[str, Any]) -> list[Any]:
-    """Returns the kinds of element that stand in tables which may not be in order."""
+    """Returns the kinds of element that stand in tables which may be invalid."""
     elements, events = (
         [of for of in _listed(tables.get(key)) if isinstance(of, dict)] for key in ("dissipation", "event")
     )
@@ -199,7 +199,7 @@ def _one_of(models: list[Any]) -> Any:
 
 
 def fault(times: Sequence[float], forces: Sequence[float]) -> tuple[int, str] | None:
-    """Returns the first sample at which these are no function of time, and why; None when they are one."""
+    """Returns the first sample at which the lists are not a function of time, and why; None if they are one."""
     if not times:
         return 0, "There must be at least one sample."
     if len(times) != len(forces):

@@ -67,7 +67,7 @@ def _whole_schema(kinds: tuple[tuple[str, type[Element]], ...]) -> Schema:
 
 
 def schema_at(schema: Schema, path: tuple[str | int, ...], data: Any) -> Schema:
-    """Returns the part of ``schema`` that rules the value at ``path`` of ``data``; empty where nothing does."""
+    """Returns the part of ``schema`` that governs the value at ``path`` of ``data``; empty if nothing does."""
     node = _chosen(schema, schema, data)
     for key in path:
         inner = node.get("items", {}) if isinstance(key, int) else node.get("properties", {}).get(key, {})
@@ -80,7 +80,7 @@ def schema_at(schema: Schema, path: tuple[str | int, ...], data: Any) -> Schema:
 
 
 def alternatives(schema: Schema, rule: Schema) -> list[str]:
-    """Returns the names that may stand where ``rule`` rules: the values of a choice, or the kinds of a table."""
+    """Returns the names that may stand where ``rule`` applies: the values of a choice, or the kinds of a table."""
     if "anyOf" in rule:
         return [_chosen(schema, choice, None)["properties"]["kind"]["const"] for choice in rule["anyOf"]]
     names = rule.get("enum", [rule.get("const")])
@@ -88,7 +88,7 @@ def alternatives(schema: Schema, rule: Schema) -> list[str]:
 
 
 def keys_of_all(schema: Schema, rule: Schema) -> list[str]:
-    """Returns the keys that a table of any kind may have where ``rule`` rules, each once."""
+    """Returns the keys that a table of any kind may have where ``rule`` applies, each once."""
     tables = [_chosen(schema, choice, None) for choice in rule.get("anyOf", ())]
     return list(dict.fromkeys(key for table in tables for key in table.get("properties", ())))
 

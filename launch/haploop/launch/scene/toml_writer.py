@@ -16,7 +16,7 @@ _ESCAPES = {ord('"'): '\\"', ord("\\"): "\\\\", **{c: f"\\u{c:04x}" for c in [*r
 def to_toml(scene: Tables, known: Mapping[str, list[str]] | None = None) -> str:
     """Returns the TOML text of a dict of str, bool, int, finite float, lists and dicts; TypeError for other values.
 
-    ``known`` has the ``lines`` of some of its tables by key, which are then not made anew.
+    ``known`` has the ``lines`` of some of its tables by key, which are then not made again.
     """
     return "\n".join(_table(scene, (), known or {})).lstrip("\n") + "\n"
 
@@ -42,7 +42,7 @@ def inline(value: Any) -> str:
 
 
 def _table(table: Tables, path: tuple[str, ...], known: Mapping[str, list[str]] = _NOTHING) -> list[str]:
-    """Lines of a table: its plain keys first, since they belong to the header above them, then its sub-tables."""
+    """Returns a table's lines: its plain keys first, as they belong to the header above them, then its sub-tables."""
     made: list[str] = []
     headed: list[str] = []
     for key, value in table.items():

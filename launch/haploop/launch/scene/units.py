@@ -12,7 +12,7 @@ from typing import Any
 from haploop.protocol.names import nearest
 
 _NUMBER = r"[+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?"
-# Products, quotients, one-digit powers and roots of names: no more is let through to pint, which does arithmetic.
+# Products, quotients, one-digit powers and roots of names: nothing else is passed to pint, which does arithmetic.
 _FACTOR = r"(?:[^\W\d]\w*|%|°)(?:(?:\*\*|\^)-?(?:0\.5|\d)|⁻?[¹²³⁴])?"
 _UNIT = rf"{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*"
 # One division by a number, after the amount or after its unit.
@@ -22,7 +22,7 @@ _TEXT = re.compile(rf"\s*({_NUMBER})\s*(?:/\s*({_NUMBER})\s*)?({_UNIT})?\s*(?:/\
 def from_text(text: str, target: str) -> Decimal:
     """Returns the number that ``text``, such as ``"0.15 N/mm"`` or ``"0.2 m / 4096"``, is in the unit ``target``.
 
-    Raises ValueError with a full sentence that says why it is none.
+    Raises ValueError with a full sentence that says why it is not one.
     """
     match = _TEXT.fullmatch(text)
     if not match and re.match(r"\s*[+-]?\d+,\d", text):
@@ -53,7 +53,7 @@ def name_and_unit(head: str) -> tuple[str, str]:
 def scale_of(unit: str, target: str) -> float:
     """Returns what numbers in a unit are multiplied by to be in ``target``; 1 for "".
 
-    A number stands for itself, and may have a unit: ``"11 um"`` a count. Raises ValueError with a full sentence.
+    A number stands for itself, and may have a unit: ``"11 um"`` per count. Raises ValueError with a full sentence.
     """
     if not unit:
         return 1.0
@@ -76,7 +76,7 @@ def is_number(text: str) -> bool:
     return True
 
 
-# The units that texts are mostly written in: exponents of kg, m, s and rad, and the factor to them. Pint knows every
+# The units that most texts use: exponents of kg, m, s and rad, and the factor to them. Pint knows every
 # unit, but takes half a second or more to load; a running loop cannot wait for it.
 _PREFIXES = {"": 0, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3, "c": -2, "k": 3, "M": 6}
 _PREFIXED = {
@@ -123,12 +123,12 @@ def _exact(unit: str) -> tuple[Exponents, Decimal] | None:
 
 
 def is_unit(text: str) -> bool:
-    """Tells whether a text is one of the units that texts are mostly written in, such as ``mm`` or ``N s/m``."""
+    """Tells whether a text is one of the units that most texts use, such as ``mm`` or ``N s/m``."""
     return bool(text.strip()) and _exact(text.strip()) is not None
 
 
 def is_exotic(text: str) -> bool:
-    """Tells whether a text is a number with a unit that pint alone may know."""
+    """Tells whether a text is a number with a unit that only pint may know."""
     match = _TEXT.fullmatch(text)
     return bool(match) and _exact(match[3] or "") is None
 
@@ -157,7 +157,7 @@ def _convert(amount: Decimal, unit: str, target: str) -> Decimal:
     return amount * (given[1] / wanted[1])
 
 
-# Quantities by their dimension, for whom N s/m says more than [mass] / [time].
+# Quantities by their dimension, for readers to whom N s/m says more than [mass] / [time].
 _QUANTITIES = {
     "[length]": "a length", "[mass]": "a mass", "[time]": "a time", "1 / [time]": "a rate",
     "[length] / [time]": "a speed", "[length] / [time] ** 2": "an acceleration",
@@ -166,7 +166,7 @@ _QUANTITIES = {
     "[length] ** 2 * [mass] / [time] ** 3": "a power", "dimensionless": "a bare number",
     "[length] * [mass] / [time] ** 2": "a force", "[length] ** 2 * [mass] / [time] ** 2": "a torque or an energy",
 }  # fmt: skip
-# Names that pint takes for another unit of the same dimension than is mostly meant by them.
+# Names that pint takes for a unit of the same dimension other than the one that is mostly meant.
 _TRAPS = {
     "gr": "gr is the grain, 65 mg; write g.", "mgr": "mgr is a thousandth of the grain, 65 ng; write mg.",
     "ton": "ton is the short ton, 907 kg; write t, which is 1000 kg.",
@@ -202,7 +202,7 @@ def _convert_any(amount: Decimal, unit: str, target: str) -> Decimal:
     return units.Quantity(amount, given).to(wanted).magnitude
 
 
-# Names that units are given by in words, with their signs.
+# Names of units in words, with their symbols.
 _IN_WORDS = {
     "seconds": "s", "milliseconds": "ms", "microseconds": "us", "minutes": "min", "metres": "m", "centimetres": "cm",
     "millimetres": "mm", "micrometres": "um", "grams": "g", "kilograms": "kg", "newtons": "N", "hertz": "Hz",
@@ -211,12 +211,12 @@ _IN_WORDS = {
 
 
 def _alike(name: str) -> list[str]:
-    """Returns the units that are written as a name is but for upper and lower case; itself where none is."""
+    """Returns the units that differ from a name only in upper and lower case; the name itself if there is none."""
     return [name] if name in _UNITS else [sign for sign in _UNITS if sign.lower() == name.lower()] or [name]
 
 
 def _meant(unit: str, target: str) -> str | None:
-    """Returns the unit of the dimension of ``target`` that comes nearest to a text that is none."""
+    """Returns the unit of the dimension of ``target`` that comes nearest to a text that is not a unit."""
     if (wanted := _exact(target)) is None:
         return None
     for names in product(*(_alike(name) for _, name, _ in _PARTS.findall(unit))):

@@ -1,4 +1,4 @@
-"""The unmodelled hand: what a scene that has one cannot hold beside it, and who cannot use such a scene."""
+"""The unmodelled hand: what a scene that has one cannot hold besides, and who cannot use such a scene."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Hand, Scene, hand_is_unmodelled
 
 _KIND = "unmodelled"
-# What takes or keeps energy between the force that is held and the hand in a way that the device's rows do not tell.
+# What takes or stores energy between the held force and the hand in a way that the device's rows do not show.
 _NEED_A_MODEL = ("clock.integrator", "transmission", "friction", "actuator.bandwidth", "accelerometer.bandwidth")
 _CANNOT_MOVE = (
     "What such a hand does no program here knows, so the device can be neither moved nor judged: only a run whose "
@@ -18,7 +18,7 @@ _CANNOT_MOVE = (
 
 
 def check_hand(draft: Draft) -> None:
-    """Refuses, beside an unmodelled hand, what says how it moves and what is booked only where all that moves is."""
+    """Refuses keys that say how an unmodelled hand moves, and effects whose energy is known only for a modelled one."""
     hand = draft.data.get("hand")
     if not isinstance(hand, dict) or hand.get("kind") != _KIND:
         return
@@ -34,7 +34,7 @@ def check_hand(draft: Draft) -> None:
 
 
 def demand_modelled(layers: Layers, scene: Scene) -> Scene:
-    """Returns the resolved scene of some layers; SceneError where its hand is unmodelled, so that nothing moves it."""
+    """Returns the resolved scene of some layers; SceneError if its hand is unmodelled, so that nothing moves it."""
     if hand_is_unmodelled(scene):
         layers.complain(("hand", "kind"), _CANNOT_MOVE)
         raise SceneError(layers.mistakes)

@@ -1,4 +1,4 @@
-"""The keys of ``[wall]``, compared with those that its kind declares, and with what elements take it for."""
+"""The keys of ``[wall]``, compared with those that its kind declares, and with what elements assume about it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def check_wall(layers: Layers) -> None:
-    """Adds keys that a wall lacks or does not take to the mistakes; values wrong in themselves are passed over."""
+    """Adds to the mistakes the keys that a wall lacks or does not take; skips values wrong in themselves."""
     table = layers.data.get("wall")
     if not isinstance(table, dict) or table.keys() <= {"position", "stiffness", "occupies"}:
         return
@@ -44,7 +44,7 @@ def with_defaults(scene: Scene) -> Scene:
 
 
 def check_spring(layers: Layers, scene: Scene, kinds: Mapping[str, type[Element]]) -> None:
-    """Adds a wall that is no spring to the mistakes where an element takes it for one."""
+    """Adds to the mistakes a wall that is not a spring, if an element takes it for one."""
     if class_of(scene.wall) is Spring:
         return
     for element in elements_of(scene):

@@ -15,7 +15,7 @@ from typing import Any
 class NodeOutput(io.TextIOWrapper):
     """A standard stream that marks lines as they are printed; ``close`` leaves it open.
 
-    Bytes that are not text pass unchanged. A file that takes no more (a full disk) is no error for the code that prints.
+    Bytes that are not text pass unchanged. A file that takes no more (a full disk) is no error for whoever prints.
 
     Attributes:
         lines: the raw stream below; its ``tick`` returns the tick at work, and is None before there is one.

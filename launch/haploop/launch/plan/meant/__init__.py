@@ -1,4 +1,5 @@
-"""Notes on scenes that are in order but cannot be meant; ``notes.note_unmeant`` is the way in.
+"""Notes on scenes that are valid but cannot be meant; ``notes.note_unmeant`` returns them.
 
-A ``rule.Rule`` has its condition and the sentence it says: ``reach`` says why a wall is not reached, ``loop`` all else.
+A ``rule.Rule`` has a condition and its sentence: those of ``reach`` say why a wall is not reached, ``loop`` has the
+others.
 """

@@ -1,4 +1,4 @@
-"""Numbers of a scene that several rules ask for: the hand's largest force, the way to the wall."""
+"""Numbers of a scene that several rules need: the hand's largest force, the distance to the wall."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _SAMPLES = 10_001
 
 
 def _extremes_N(scene: Scene) -> tuple[float, float]:
-    """Returns the least and the largest force of the hand; of a kind that is not haploop's own, among samples of it."""
+    """Returns the least and the largest force of the hand; for a kind that is not haploop's own, among its samples."""
     force = scene.hand.force if scene.hand else None
     if force is None:
         return 0.0, 0.0
@@ -28,7 +28,7 @@ def _extremes_N(scene: Scene) -> tuple[float, float]:
 
 
 def most_force_N(scene: Scene) -> float:
-    """Returns the largest force of the hand, to either side."""
+    """Returns the largest force of the hand, in either direction."""
     return max(map(abs, _extremes_N(scene)))
 
 

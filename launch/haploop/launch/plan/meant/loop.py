@@ -1,4 +1,4 @@
-"""Rules of times, contact, the wall that a hand presses, and events."""
+"""Rules on times, contact, the wall that a hand presses, and events."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from haploop.launch.plan.meant.rule import Found, Rule
 from haploop.protocol.scene.scene import NO_ELEMENT, Scene, accelerometer_is_used, hand_is_unmodelled
 from haploop.protocol.walls.registry import make_wall
 
-# A softer wall is mostly one meant in N/mm.
+# The stiffness of a softer wall was mostly meant in N/mm.
 SOFTEST_N_M = 20.0
 _MANY_TICKS, _DEEP_M = 1000, 1e-3
 _LONG_TICKS = 10_000_000
-# A hand that presses deeper than this is at the end of most devices' way.
+# A hand that presses deeper than this is at the end of the travel of most devices.
 _DEEPEST_PRESSED_M = 0.02
 
 
@@ -50,9 +50,9 @@ def _begins_deep(scene: Scene) -> Found | None:
 
 
 def _pressed_deep(scene: Scene) -> Found | None:
-    """Compares what the wall gives at 2 cm with what the hand presses by there, less what its spring holds back.
+    """Compares the wall's force at a depth of 2 cm with the hand's force there, less what the hand's spring holds back.
 
-    A run that ends before the hand's damping has let the device come as far is not meant.
+    The rule does not apply to a run that ends before the hand's damping has let the device come that far.
     """
     hand, wall = scene.hand, scene.wall
     if hand is None or wall is None or hand_is_unmodelled(scene) or wall.stiffness < SOFTEST_N_M:
@@ -79,7 +79,7 @@ def _pressed_deep(scene: Scene) -> Found | None:
 
 
 def _overwritten(scene: Scene) -> Found | None:
-    """Tells of the first two events of one tick of which the later takes away what the earlier did."""
+    """Finds the first two events of one tick of which the later overwrites what the earlier did."""
     rate = scene.clock.control_rate
     did: dict[tuple[int, str], int] = {}
     for index, event in enumerate(scene.event):

@@ -1,4 +1,4 @@
-"""The notes on a scene: of every rule that it breaks, and of numbers that hardly any loop has."""
+"""The notes on a scene: for every rule that it breaks, and for numbers that hardly any loop has."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from haploop.protocol.register import UnknownKind
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
 
-# Beyond these a number is in order, but more often a slip of the unit: key, least, most, unit.
+# Beyond these bounds a number is valid, but more often a slip of the unit: key, least, most, unit.
 _USUAL = (
     ("clock.round_trip_delay", 0.0, 1.0, "s"),
     ("wall.stiffness", SOFTEST_N_M, 1e6, "N/m"),
@@ -43,12 +43,12 @@ def note_unmeant(scene: Scene) -> list[Note]:
 
 
 def _broken(rule: Rule, scene: Scene) -> Found | None:
-    """Asks a rule; one says nothing that asks a wall or a force that is not at hand, or whose code raises."""
+    """Applies a rule; it says nothing if it needs a wall or a force that is not available, or whose code raises."""
     try:
         return rule.broken(scene)
     except UnknownKind:
         return None
     except Exception as error:
-        if raised_in_file(error):  # the run will tell it
+        if raised_in_file(error):  # the run will report it
             return None
         raise

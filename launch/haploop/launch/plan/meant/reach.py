@@ -1,4 +1,4 @@
-"""Rules that say why a device does not come to the wall, or is not held there."""
+"""Rules that say why a device does not reach the wall, or is not held there."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from haploop.launch.plan.meant.rule import Found, Rule
 from haploop.protocol.scene.hand_force import Trace, constant_from_s
 from haploop.protocol.scene.scene import Scene, hand_is_unmodelled
 
-# A force does next to nothing against friction of which it is no more than this share, or a spring that it stretches by
-# no more than this share of the way.
+# A force does next to nothing if it is no more than this share of the friction, or if it stretches a spring by no more
+# than this share of the distance.
 _FEEBLE = 0.1
 
 
 def _pushed_by_nothing(scene: Scene) -> Found | None:
-    """Tells whether a device is at rest at t = 0 in balance, without a force to come; noise alone may move it."""
+    """Tells whether a device is at rest in balance at t = 0, with no force to come and no noise, which may move it."""
     hand, device = scene.hand, scene.device
     if hand_is_unmodelled(scene) or scene.others or scene.noise or wall_moves(scene):
         return None
@@ -32,7 +32,7 @@ def _pushed_by_nothing(scene: Scene) -> Found | None:
 
 
 def _held_by_friction(scene: Scene) -> Found | None:
-    """Compares dry friction with the most that hand and spring push a device by that is at rest outside the wall."""
+    """Compares dry friction with the largest push of hand and spring on a device that is at rest outside the wall."""
     hand, rubs, begin = scene.hand, scene.friction, scene.device.position
     is_pushed = scene.others or scene.device.velocity or start_depth_m(scene) > 0.0 or wall_moves(scene)
     if hand is None or rubs is None or hand_is_unmodelled(scene) or is_pushed:
@@ -42,7 +42,7 @@ def _held_by_friction(scene: Scene) -> Found | None:
 
 
 def _feeble_beside_friction(scene: Scene) -> Found | None:
-    """Compares the hand's largest force with dry friction, of a device that something else moves."""
+    """Compares the hand's largest force with dry friction, for a device that something else moves."""
     if hand_is_unmodelled(scene) or _held_by_friction(scene) is not None:
         return None
     force_N, friction_N = most_force_N(scene), _friction_N(scene)
@@ -61,11 +61,12 @@ def _beyond_the_end(scene: Scene) -> Found | None:
 
 
 def _out_of_reach(scene: Scene) -> Found | None:
-    """Compares the way to the wall with the longest that hand and speed can move the one mass there is.
+    """Compares the distance to the wall with the farthest that hand and speed can move the single mass.
 
-    With m x'' + b x' + k x = F, |F| <= F_max, w = sqrt(k / m) and x from the spring's rest: |x| is at most
-    sqrt(x0^2 + (v0 / w)^2) + F_max G, G the integral of the impulse response's size: 1 / k where it never swings, else
-    coth(pi z / (2 sqrt(1 - z^2))) / k with z = b / (2 sqrt(k m)). Without a spring |v| is at most |v0| + F_max t / m.
+    With m x'' + b x' + k x = F, |F| <= F_max, w = sqrt(k / m) and x measured from the spring's rest: |x| is at most
+    sqrt(x0^2 + (v0 / w)^2) + F_max G, with G the integral of the impulse response's magnitude: 1 / k if it does not
+    oscillate, else coth(pi z / (2 sqrt(1 - z^2))) / k with z = b / (2 sqrt(k m)). Without a spring |v| is at most
+    |v0| + F_max t / m.
     """
     hand, device, wall = scene.hand, scene.device, scene.wall
     always = any(element.acts == "always" for element in scene.dissipation)
@@ -93,11 +94,11 @@ def _out_of_reach(scene: Scene) -> Found | None:
 
 
 def _reach_of_chain_m(scene: Scene) -> float:
-    """Returns a bound of the way of a chain of springs from rest under a force that only grows; infinity of any other.
+    """Returns a bound on how far a chain of springs moves from rest under a force that only grows; else infinity.
 
-    A step of F on the hand's mass gives F s_0 to the springs at most, s_i their stretches, s_0 that to the ground:
-    k_0 s_0^2 + sum k_i s_i^2 <= 2 F s_0, so s_0 <= 2 F / k_0 and sum k_i s_i^2 <= F^2 / k_0; a force that grows is a
-    sum of steps.
+    A step of F on the hand's mass gives at most F s_0 to the springs, with s_i their stretches, s_0 that of the spring
+    to the ground: k_0 s_0^2 + sum k_i s_i^2 <= 2 F s_0, so s_0 <= 2 F / k_0 and sum k_i s_i^2 <= F^2 / k_0; a force
+    that grows is a sum of steps.
     """
     hand, device = scene.hand, scene.device
     if hand is None or hand.force is None or math.isinf(constant_from_s(hand.force)):
@@ -122,9 +123,9 @@ def _pushed_away(scene: Scene) -> Found | None:
 
 
 def _not_held_there(scene: Scene) -> Found | None:
-    """Compares the way to the wall with where the hand's force, over its stiffness, holds the device in the end.
+    """Compares the distance to the wall with where the hand's force, over its stiffness, holds the device in the end.
 
-    What is thrown at the wall may be meant to leave it again, but hardly by a hand whose force does next to nothing.
+    A device thrown at the wall may be meant to leave it again, but hardly if the hand's force does next to nothing.
     """
     hand, device, wall = scene.hand, scene.device, scene.wall
     if hand is None or wall is None or hand_is_unmodelled(scene) or not hand.stiffness or not hand.force:
@@ -140,7 +141,7 @@ def _not_held_there(scene: Scene) -> Found | None:
     return {"way_mm": way_m * 1e3, "reach_mm": reach_m * 1e3} if way_m > reach_m else None
 
 
-# Each tells by itself why the wall is not reached.
+# Each of these alone says why the wall is not reached.
 _KEPT_OFF = (
     _pushed_by_nothing,
     _held_by_friction,

@@ -1,4 +1,4 @@
-"""A rule of what cannot be meant, and the note that it gives."""
+"""A rule on what cannot be meant, and the note that it gives."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Found = Mapping[str, Any]
 
 
 class Note(str):
-    """A sentence on a scene that is in order.
+    """A sentence on a valid scene.
 
     Attributes:
-        key: what it speaks of, a dotted key of the resolved scene.
-        keeps_off: whether it tells why the device does not touch the wall.
+        key: the dotted key of the resolved scene that it is about.
+        keeps_off: whether it says why the device does not touch the wall.
     """
 
     __slots__ = ("keeps_off", "key")
@@ -27,9 +27,9 @@ class Note(str):
 
 
 class Rule(NamedTuple):
-    """A rule: the numbers of its sentence where a resolved scene breaks it, None where it holds.
+    """A rule: ``broken`` returns the numbers of its sentence if a resolved scene breaks it, None if it holds.
 
-    ``key`` is what it speaks of; its name in braces is taken from what was found.
+    ``key`` is what it is about; a name in braces in it is replaced by what was found under that name.
     """
 
     broken: Callable[[Scene], Found | None]

@@ -1,1 +1,1 @@
-"""One TOML file: ``tables`` reads it, or says why it cannot; ``lines`` tells where each key stands."""
+"""One TOML file: ``tables`` reads it, or says why it cannot; ``lines`` finds where each key stands."""

@@ -20,14 +20,14 @@ from haploop.protocol.scene.table import Tables
 
 # No scene needs more files that extend one another.
 _MOST_FILES = 100
-# Keys that say what else is in their table, each with the keys that are there whatever it says.
+# Keys that say what else is in their table, each with the keys that are there whatever its value.
 _SORTS = {"kind": (), "estimator": ("source", "cutoff")}
 _OF_EVERY_KIND: dict[KeyPath, tuple[str, ...]] = {("wall",): ("position", "stiffness", "occupies")}
-# Keys of a table that stand for others of it: a file that gives the one takes away the others.
+# Keys of a table that stand in place of others: a file that gives the one removes the others.
 _INSTEAD: dict[KeyPath, dict[str, set[str]]] = {
     ("encoder",): {"resolution": {"bits", "range"}, "bits": {"resolution"}, "range": {"resolution"}}
 }
-# Tables of which one that names no kind is of a kind, too.
+# Tables for which naming no kind is a kind too.
 _KINDLESS = [("hand",)]
 
 
@@ -37,9 +37,9 @@ class Layers:
 
     Attributes:
         origins: the file, or ``"--set"``, that gave each value, and the last file that wrote into each table.
-        gone_over: mistakes with which reading goes on: of keys that are given twice in one file, of absent files.
-        files: how many have been read.
-        lacks_a_file: whether one that is extended is absent, which may hold any key that is missing.
+        gone_over: mistakes after which reading continues: keys that are given twice in one file, absent files.
+        files: how many files have been read.
+        lacks_a_file: whether an extended file is absent, which may hold any key that is missing.
     """
 
     path: Path
@@ -62,7 +62,7 @@ class Layers:
     ) -> None:  # fmt: skip
         """Adds a mistake about ``key``, whose value is quoted unless ``given`` says what was found.
 
-        ``place`` is the key that stands where the mistake was made, if it is another.
+        ``place`` is the key at which the mistake was made, if it is another one.
         """
         if given is None:
             given = f"is {_quoted(self.value(key))}"
@@ -118,10 +118,10 @@ class Layers:
 def read_layers(path: Path) -> Layers:
     """Returns the scene file at ``path`` laid over all that it extends; of several the later wins.
 
-    Where there is no such file, a path is the name of one that comes with haploop: a scene, or for ``extends`` one
+    Where there is no such file, a path is the name of one that comes with haploop: a scene or, for ``extends``, one
     with its folder, ``devices/premium15.toml``.
 
-    Raises SceneError for a file that cannot be read, or that extends itself. One that is extended and absent is a
+    Raises SceneError for a file that cannot be read, or that extends itself. An extended file that is absent is a
     mistake of the layers.
     """
     path = found(path, "scenes")
@@ -134,7 +134,7 @@ def read_layers(path: Path) -> Layers:
 
 
 def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
-    """Lays the file at ``path`` on, after what it extends."""
+    """Lays on the file at ``path``, after the files that it extends."""
     here = Path(os.path.realpath(path))  # where links lead in a circle, reading the file says so
     layers.files += 1
     if len(chain) > DEEPEST or layers.files > _MOST_FILES:
@@ -170,7 +170,7 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
 
 
 def _absent(name: str, of: Path) -> tuple[str, str, str | None]:
-    """Returns what was found and expected of a name in ``of`` that is no file, and the nearest of those that are."""
+    """Returns what was found and expected for a name in ``of`` that is not a file, and the nearest one that is."""
     own = {file.name for file in of.parent.glob("*.toml")} - {of.name}
     theirs = {f"{kind}/{one}.toml" for kind in ("devices", "hands", "scenes") for one in bundled(kind)}
     meant = nearest(name if name.endswith(".toml") else f"{name}.toml", sorted(own | theirs))
@@ -181,10 +181,10 @@ def _absent(name: str, of: Path) -> tuple[str, str, str | None]:
 
 
 def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:
-    """Lays each ``dotted.key=value`` on; what is wrong is added to the mistakes of ``layers``.
+    """Lays on each ``dotted.key=value``; what is wrong is added to the mistakes of ``layers``.
 
-    A part of the key that is a number counts the elements of a list from 0, and one past its end adds one. Tables and
-    lists that are absent are made.
+    A part of the key that is a number is a place in a list, counted from 0; one past the end adds an element. Tables
+    and lists that are absent are made.
     """
     for text in overrides:
         name, value = split_assignment(text) or ("", None)
@@ -197,7 +197,7 @@ def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:
 
 
 def lay_value(layers: Layers, path: Sequence[str], value: Any) -> str | None:
-    """Makes the way to the last part and lays the value there; returns a sentence where there is no such way."""
+    """Makes the path to its last part and lays the value there; returns a sentence if there is no such path."""
     key: tuple[str | int, ...] = ()
     node: Any = layers.data
     for part, after in zip(path, [*path[1:], None], strict=True):

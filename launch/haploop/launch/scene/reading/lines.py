@@ -19,8 +19,8 @@ class Outline:
     """The keys of a text.
 
     Attributes:
-        data: its tables; of a key that is given again, the first value.
-        at: the line of every key and table, from 1; keys within a value on one line are at its first.
+        data: its tables; for a key that is given again, the first value.
+        at: the line of every key and table, from 1; keys inside a value are at the first line of that value.
         doubled: keys that are given again, with the lines of both.
     """
 
@@ -35,7 +35,7 @@ class Outline:
         return self.at.get(key)
 
     def put(self, node: Tables, key: KeyPath, given: Tables, line: int) -> None:
-        """Puts keys that were read in a line into the table at ``key``; those that are there already are doubled."""
+        """Puts keys that were read in a line into the table at ``key``; records those already there as doubled."""
         for name, value in given.items():
             inner = (*key, name)
             if name not in node:
@@ -72,7 +72,7 @@ class Outline:
 
 
 def outline(text: str) -> Outline | None:
-    """Returns the keys of a TOML text with their lines; None where it is no TOML, but for keys given twice."""
+    """Returns the keys of a TOML text with their lines; None if it is not TOML, apart from keys given twice."""
     found = Outline()
     node, key = found.data, ()
     headed: set[KeyPath] = set()
@@ -82,7 +82,7 @@ def outline(text: str) -> Outline | None:
                 node, key = found.enter(_names(given), line, statement.lstrip().startswith("[["), headed)
             else:
                 found.put(node, key, given, line)
-    except (ValueError, TypeError, AttributeError, RecursionError):  # a key that is no table is used as one
+    except (ValueError, TypeError, AttributeError, RecursionError):  # a key that is not a table is used as one
         return None
     return found
 
@@ -100,9 +100,9 @@ def line_in(path: str, key: KeyPath) -> int | None:
 
 
 def _statements(text: str) -> Iterator[tuple[int, str, Tables]]:
-    """Yields every header and every key with its value: its first line, its text, and that read by itself.
+    """Yields every header and every key with its value: its first line, its text, and the text parsed on its own.
 
-    Raises ValueError where one is no TOML.
+    Raises ValueError where one is not TOML.
     """
     held: list[str] = []
     begun = depth = 0
@@ -113,7 +113,7 @@ def _statements(text: str) -> Iterator[tuple[int, str, Tables]]:
             begun, depth = number, 0
         held.append(line)
         depth += sum(map(line.count, "[{")) - sum(map(line.count, "]}"))
-        if depth > 0 and not any(mark in line for mark in "\"'#"):  # a list goes on: long ones are not tried anew
+        if depth > 0 and not any(mark in line for mark in "\"'#"):  # within a list: long ones are not tried again
             continue
         statement = "\n".join(held)
         try:
@@ -127,7 +127,7 @@ def _statements(text: str) -> Iterator[tuple[int, str, Tables]]:
 
 
 def _names(header: Any) -> list[str]:
-    """Returns the names of a header that was read by itself: a table in a table, or in a list of one."""
+    """Returns the names of a header that was parsed on its own: a table in a table, or in a list of one."""
     names = []
     while header:
         [(name, header)] = header.items()

@@ -53,7 +53,7 @@ _IN_BITS, _IN_COUNTS = " {0} counts are {1} bits.", ' {0} counts over 0.2 m are 
 
 
 def _of_a_count(name: str, value: object) -> str:
-    """Returns how a number of counts, given for that of bits, is written; "" for any other value."""
+    """Returns how to write a number of counts that was given as the number of bits; "" for any other value."""
     if name != "bits" or not isinstance(value, int) or value <= 64:
         return ""
     bits = value.bit_length() - 1
@@ -61,7 +61,7 @@ def _of_a_count(name: str, value: object) -> str:
 
 
 def _read_recording(layers: Layers) -> None:
-    """Puts the samples of a recorded hand force in place of its file, so that the scene runs by itself."""
+    """Puts the samples of a recorded hand force in place of its file, so that the scene can be run on its own."""
     hand = layers.data.get("hand")
     force = hand.get("force") if isinstance(hand, dict) else None
     if not isinstance(force, dict) or force.get("kind") != "trace" or "file" not in force:

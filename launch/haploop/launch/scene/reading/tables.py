@@ -1,4 +1,4 @@
-"""The tables of one TOML file, or the sentence on why there are none."""
+"""The tables of one TOML file, or a sentence that says why there are none."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from haploop.launch.scene.reading.lines import outline
 from haploop.protocol.files import line_of, read_text
 from haploop.protocol.scene.table import Tables
 
-# No scene needs tables deeper in one another than this, nor more keys outside of lists; a thousand of them would end
-# the program.
+# No scene needs tables nested deeper than this, nor more keys outside lists; tables a thousand deep would end the
+# program.
 DEEPEST, _MOST_KEYS = 32, 2000
 
 
@@ -24,11 +24,11 @@ def parse(
     needs: str = "a duration and a [device]",
     doubled: list[Mistake] | None = None,
 ) -> Tables:
-    """Returns the tables of one TOML file, which is a ``what`` and needs some keys at least.
+    """Returns the tables of one TOML file, which is a ``what`` and needs at least the keys in ``needs``.
 
-    Keys that are given twice are added to ``doubled``, where that is given, and the first value is taken.
+    Keys that are given twice are added to ``doubled``, if that is given, and the first value is taken.
 
-    Raises SceneError where it is missing, empty, no file, no text or no TOML (with line and column).
+    Raises SceneError if the file is missing, empty, not a file, not text or not TOML (with line and column).
     """
     text, line = "", None
     try:
@@ -61,7 +61,7 @@ def parse(
 
 
 def _line_of(problem: str, text: str) -> int | None:
-    """Returns the line that a sentence of tomllib's is about; None where it names none."""
+    """Returns the line that a sentence of tomllib is about; None if it names none."""
     if "at end of document" in problem:
         return len(text.splitlines())
     at = re.search(r"at line (\d+)", problem)
@@ -69,7 +69,7 @@ def _line_of(problem: str, text: str) -> int | None:
 
 
 def _hint(problem: str, text: str) -> str:
-    """Returns how to write a value that TOML has no form for: a decimal comma, or a unit without quotes."""
+    """Returns how to write a value for which TOML has no form: a decimal comma, or a unit without quotes."""
     if re.search(r"Illegal character '\\n'|Unterminated string|Expected \"'", problem):
         return " A quotation mark is not closed."
     line = re.search(r"at line (\d+)", problem)
@@ -83,14 +83,14 @@ def _hint(problem: str, text: str) -> str:
 
 
 def _with_the_first(path: Path, text: str, doubled: list[Mistake]) -> Tables | None:
-    """Returns the tables of a text that is TOML but for keys given twice, which are added; None of any other."""
+    """Returns the tables of a text that is TOML except for keys given twice, which are added; else None."""
     found = outline(text)
     if found is None or not found.doubled:
         return None
     expected = "Leave one of the two out."
     keys = {key for key, *_ in found.doubled}
     for key, first, again in found.doubled:
-        if any(key[:depth] in keys for depth in range(1, len(key))):  # the table that holds it is told already
+        if any(key[:depth] in keys for depth in range(1, len(key))):  # the table that holds it is reported already
             continue
         given = f"is given again, after line {first}"
         doubled.append(Mistake(shown(path), ".".join(map(str, key)), given, expected, line=again))
@@ -107,11 +107,11 @@ _OTHERS = {
 
 
 def _absent(path: Path, what: str) -> str:
-    """Returns the sentence on a file that is not there; its name may have been meant for another, or for a scene."""
+    """Returns the sentence on a missing file; its name may have been meant for another, or for one of another sort."""
     hint = f", and no {what} of that name comes with haploop" if path.name == str(path) else ""
     is_of = [folder for folder in _OTHERS if folder != f"{what}s" and path.stem in bundled(folder)]
     meant = like(path.stem, f"{what}s", path.parent)
-    if meant and is_of and not meant.startswith(path.stem):  # of two that are alike the one that is there is meant
+    if meant and is_of and not meant.startswith(path.stem):  # a name that exists is meant, not a similar one
         meant = None
     told = [_OTHERS[folder].format(path.stem) for folder in is_of[:1]]
     return " ".join([f"There is no such file{hint}{f'; did you mean {meant}?' if meant else '.'}", *told])
@@ -121,7 +121,7 @@ _TOO_DEEP = f"Tables and lists may lie at most {DEEPEST} deep in one another."
 
 
 def excess(value: Any) -> str:
-    """Returns what there is too much of in a value that was read, as a sentence; "" for nothing."""
+    """Returns a sentence on what there is too much of in a value that was read; "" if there is nothing."""
     level, depth = [value], 0
     while level:
         inner = [one for node in level for one in (node.values() if isinstance(node, dict) else node)]

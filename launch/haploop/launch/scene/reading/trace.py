@@ -15,12 +15,12 @@ class TraceError(ValueError):
 
 
 def read_trace(path: Path) -> tuple[list[float], list[float]]:
-    """Returns times in s and forces in N of a CSV of two columns; a header line and empty lines may be there.
+    """Returns times in s and forces in N of a two-column CSV, which may have a header line and empty lines.
 
-    A header's brackets say units, ``t (ms), force [mN]``.
+    Brackets in the header give units, ``t (ms), force [mN]``.
 
     Raises:
-        TraceError: no such file, not text, no such unit, or a line that is no pair of numbers, with its line number.
+        TraceError: no such file, not text, no such unit, or a line that is not a pair of numbers, with its number.
     """
     try:
         rows = list(csv.reader(read_text(path).splitlines()))
@@ -53,7 +53,7 @@ def read_trace(path: Path) -> tuple[list[float], list[float]]:
 
 
 def _units(line: int, header: list[str]) -> list[float]:
-    """Returns the factors of times and forces to s and N, by the units of a header."""
+    """Returns the factors that convert times and forces to s and N, by the units of a header."""
     try:
         return [scale_of(name_and_unit(head)[1], unit) for head, unit in zip(header, ("s", "N"), strict=True)]
     except ValueError as error:
