@@ -38,7 +38,7 @@ class ShownPrints:
             self._skip()
 
     def tell(self, sentences: list[str]) -> None:
-        """Shows the run's own messages, uncut, and empties the list; at most some 20 per run."""
+        """Shows the run's own messages whole, and empties the list; at most some 20 per run."""
         self._told += len(sentences)
         if self._told <= _AT_ONCE:
             self._show(sentences, longest=_LONGEST_OF_OWN)

@@ -39,7 +39,7 @@ def root(value: Any) -> Any:
 
 
 def nearest_multiple(value: Any, unit: Any) -> Any:
-    """Returns ``unit * rint(value / unit)``; unchanged if that quotient is not finite (infinite, NaN)."""
+    """Returns ``unit * rint(value / unit)``, or ``value`` if the quotient is not finite (infinite, NaN)."""
     counts = value / unit
     if counts.__class__ is float:
         return unit * float(round(counts)) if counts - counts == 0.0 else value

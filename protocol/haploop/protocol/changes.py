@@ -94,7 +94,7 @@ class Change:
         """Returns the change in a few words, such as ``element 0 becomes damping (damping 0.8 N s/m)``.
 
         Args:
-            units: unit by settable key, and by kind and parameter (``damping.damping``); others are written without.
+            units: unit by settable key, and by kind and parameter (``damping.damping``); a number without one is bare.
         """
         if self.swap is None:
             return "set " + ", ".join(f"{key} = {_amount(value, units.get(key))}" for key, value in self.set.items())

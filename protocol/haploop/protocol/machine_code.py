@@ -19,7 +19,7 @@ from typing import Any
 
 # Prefix of the name of the file that marks the machine code beside it as complete.
 MADE = "made-"
-# Compiling takes 16 s, or a minute on a busy machine; a process that is stopped meanwhile delays others no longer.
+# Compiling takes 16 s, a minute on a busy machine; a process stopped meanwhile delays the others no longer than this.
 _PATIENCE_S = 120.0
 
 
@@ -27,10 +27,10 @@ class MachineCode:
     """A compiler of a module's functions, which keeps the machine code beside that module's file.
 
     numba itself checks only the file of a function, and would continue to use the machine code of formulas that have
-    changed. Here each state of the sources, of the module and of those whose functions it compiles, has a directory.
+    changed. Here each state of the sources, of the module and of those whose functions it compiles, has its directory.
 
     Attributes:
-        kept: that directory; "" if there is none that can be written to.
+        kept: the directory of the present state; "" if it cannot be written.
     """
 
     def __init__(self, file: str, formulas: tuple[ModuleType, ...]) -> None:
@@ -67,7 +67,7 @@ class MachineCode:
     def try_out(self, function: Callable[[], object]) -> None:
         """Calls a function that compiles or loads the loops, and marks the kept machine code as complete.
 
-        Raises whatever numba raises; the kept machine code may be damaged then, so the next process finds none.
+        Raises whatever numba raises, and removes the kept machine code, which may be damaged.
         """
         try:
             with self._one_at_a_time():

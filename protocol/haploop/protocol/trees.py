@@ -71,7 +71,7 @@ def tree_take(tree: T, places: np.ndarray) -> T:
 
 
 def tree_member(tree: T, place: int) -> T:
-    """Returns the tree of one member: an array of shape (members,) becomes its number, one with more axes loses one.
+    """Returns the tree of one member: an array of shape (members,) becomes its number, one of more axes loses its last.
 
     An array whose last axis has length 1 holds for every member.
     """

@@ -81,7 +81,8 @@ def multiplications(scene: Scene) -> int:
     """Counts multiplications that move the bodies through one tick: each state by each state, command and friction.
 
     One mass is moved once per hold and filled in at the plant steps; a chain of bodies is moved to every plant step.
-    The classical Runge-Kutta method moves them four times; DOP853 counts as twelve times per tick, the least there is.
+    The classical Runge-Kutta method moves them four times; for DOP853, twelve times per tick are counted, the least
+    that there is.
     """
     time, size = Timebase.from_scene(scene), len(Chain.from_scene(scene).states)
     if needs_chain(scene):

@@ -144,7 +144,7 @@ def _setting(
 
 
 def _fixed(name: str, settable: dict[str, Number]) -> str:
-    """Returns a sentence on the table of a key if it is one of the scene in which a run changes nothing; else ""."""
+    """Returns a sentence on the table of a key if nothing in that table of a scene changes in a run; "" otherwise."""
     table = name.partition(".")[0]
     is_fixed = table != name and hasattr(Scene, table) and not any(key.startswith(f"{table}.") for key in settable)
     return f"Nothing of [{table}] changes in a run. " if is_fixed else ""

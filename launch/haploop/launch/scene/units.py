@@ -76,8 +76,8 @@ def is_number(text: str) -> bool:
     return True
 
 
-# The units that most texts use: exponents of kg, m, s and rad, and the factor to them. Pint knows every
-# unit, but takes half a second or more to load; a running loop cannot wait for it.
+# The units that most texts use: exponents of kg, m, s and rad, and the factor to them. Pint knows every unit, but takes
+# half a second or more to load; a running loop cannot wait for it.
 _PREFIXES = {"": 0, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3, "c": -2, "k": 3, "M": 6}
 _PREFIXED = {
     "g": ((1, 0, 0, 0), -3),

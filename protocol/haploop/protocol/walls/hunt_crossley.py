@@ -15,8 +15,8 @@ from haploop.protocol.walls.wall import Wall
 class HuntCrossley(Wall):
     """f = k p^n (1 + d p'), never below 0 (Hunt & Crossley 1975); V = k p^(n+1) / (n + 1).
 
-    The parameter is the stiffness K that the wall shows at rest at a reference depth p_r: k = K p_r^(1-n), so that K
-    is in N/m for any n. Left to itself the law gives
+    It is parametrised by the stiffness K that the wall shows at rest at a reference depth p_r: k = K p_r^(1-n), so
+    that K is in N/m for any n. Left to itself the law gives
         v_in / d - ln(1 + d v_in) / d^2 = -v_out / d - ln(1 - d v_out) / d^2
     for the speeds at which a free mass arrives and leaves, whatever the mass, K and n. Where the mass leaves faster
     than 1 / d the force is 0: the wall never pulls.

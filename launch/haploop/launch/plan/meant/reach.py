@@ -22,7 +22,7 @@ _FEEBLE = 0.1
 
 
 def _pushed_by_nothing(scene: Scene) -> Found | None:
-    """Tells whether a device is at rest in balance at t = 0, with no force to come and no noise, which may move it."""
+    """Tells whether a device is at rest in balance at t = 0, with no force to come, and no noise that may move it."""
     hand, device = scene.hand, scene.device
     if hand_is_unmodelled(scene) or scene.others or scene.noise or wall_moves(scene):
         return None

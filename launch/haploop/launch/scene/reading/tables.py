@@ -107,7 +107,7 @@ _OTHERS = {
 
 
 def _absent(path: Path, what: str) -> str:
-    """Returns the sentence on a missing file; its name may have been meant for another, or for one of another sort."""
+    """Returns the sentence on a missing file; its name may have been meant for another, or for one of another kind."""
     hint = f", and no {what} of that name comes with haploop" if path.name == str(path) else ""
     is_of = [folder for folder in _OTHERS if folder != f"{what}s" and path.stem in bundled(folder)]
     meant = like(path.stem, f"{what}s", path.parent)
