@@ -37,7 +37,7 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
   if (!isNumber(rate)) return {};
   const how = [found.frequency_Hz && `at ${amount(found.frequency_Hz, "Hz")}`, found.felt ? "felt" : "not felt"];
   return {
-    "held still and pushed, it swings":
+    "pushed, it swings":
       found.width_m < 1e-9 ? "less than 1 nm" : `${amount(found.width_m, "m")} ± ${amount(found.spread_m, "m", 2)}`,
     "that is": [...how, found.chaotic && "chaotic"].filter(Boolean).join(", "),
     "pushed, it ripples": `${amount(found.force_ripple_N, "N")} above 30 Hz`,
