@@ -20,7 +20,7 @@ from haploop.tools.dissipate.force_book import ForceBook, ForceRows
 from haploop.tools.dissipate.force_sign import ForceSign
 from haploop.tools.dissipate.recording.samples import Floats, Samples
 
-# Estimates begin at rest: the jump of the first samples is no noise.
+# Samples left out at the beginning: estimates start at rest, and the jump of the first samples is no noise.
 _FIRST = 4
 
 
@@ -41,13 +41,13 @@ class Booked(NamedTuple):
 class Booking:
     """Runs estimates, elements and books on samples, as a run does.
 
-    sampled  E += -f[k-1] (x_m[k] - x_m[k-1]), all the controller can know (Choi et al. 2022, eq. 4)
+    sampled  E += -f[k-1] (x_m[k] - x_m[k-1]), all that the controller can know (Choi et al. 2022, eq. 4)
     true     E += -f_held dx: command k is held for a period from t_k + d on, d = (L + mu) T; in the period after
              sample k command k - L - 1 still holds for mu T, and command k - L for the rest
 
-    After a gap everything but the sums starts again; the motion within it is not known and not booked. Nor are
-    the forces of its first samples, whose velocity and acceleration would need those that are missing: an estimate that
-    starts at rest there would book the device's kinetic energy out of nothing.
+    After a gap everything but the sums restarts; the motion within the gap is not known and not booked. Nor are the
+    forces of the first samples after it, whose velocity and acceleration would need the missing samples: an estimate
+    that starts at rest there would book the device's kinetic energy out of nothing.
 
     A recorded force is booked as the elements' forces are, in the last row.
 
@@ -59,11 +59,12 @@ class Booking:
     Attributes:
         force: the naive sum of the recorded force, and its passivity.
         taken_J, given_J: sum of the gains of the true books over the periods in which they gained, and of the losses
-            over the others, shape (rows,), a row an element and one more for a recorded force.
+            over the others, shape (rows,), one row per element and one more for a recorded force.
         strongest_N: the largest force of each, shape (rows,).
         fast_share: share of each one's mean square force that is faster than a quarter of the sampling rate, shape
-            (rows,); the line at a frequency f counts as sin(pi f T)^2, and what is left as slow. Of white noise in the
-            positions it is 0.75 in a damper's force by backward differences, and 0.83 in an inertia's.
+            (rows,); of the line at a frequency f the share sin(pi f T)^2 counts as fast, and the rest as slow. For
+            white noise in the positions it is 0.75 in a damper's force by backward differences, and 0.83 in an
+            inertia's.
     """
 
     def __init__(
@@ -91,7 +92,7 @@ class Booking:
     def add(self, piece: Samples) -> Booked:
         """Books a piece; returns the books at its samples.
 
-        Raises ElementError where an element raised, or gave something that is no finite number.
+        Raises ElementError where an element raised, or returned something that is no finite number.
         """
         if piece.begins:
             self._begin()
@@ -174,7 +175,7 @@ class Booking:
         return np.array(forces).reshape(len(forces), len(piece.x_m)), np.concatenate(velocity)
 
     def _between(self, piece: Samples, true_x: Floats) -> Floats:
-        """Returns the position at which the command changed, of every period that ends within the piece."""
+        """Returns the position at which the command changed, for every period that ends within the piece."""
         if piece.between_x_m is None:
             return self._on_a_line(true_x)
         last = np.empty(0) if self._last_between is None else self._last_between
@@ -207,13 +208,13 @@ def _wall_events(scene: Scene, time: Timebase) -> list[tuple[int, Event]]:
 
 @dataclass(frozen=True)
 class MeasuredTime(Timebase):
-    """The timebase of samples whose rate is no whole number of Hz, but that of their measured period."""
+    """The timebase of samples whose rate is that of their measured period, not a whole number of Hz."""
 
     measured_s: float
 
     @classmethod
     def from_period(cls, period_s: float, lookahead: int) -> MeasuredTime:
-        """Makes that of samples ``period_s`` apart; commands take effect ``lookahead`` samples later, or one more."""
+        """Makes the timebase of samples ``period_s`` apart; commands take effect ``lookahead`` samples later, or one more."""
         rate = max(1, round(1.0 / period_s))
         return cls(rate, rate, lookahead, 1, period_s)
 
@@ -224,7 +225,7 @@ class MeasuredTime(Timebase):
 
 @dataclass(frozen=True)
 class Recorded(Unchanged):
-    """The estimator that returns the recorded value at a place of the sample."""
+    """The estimator that returns the recorded value at one place of the sample."""
 
     place: int
 
@@ -235,7 +236,7 @@ class Recorded(Unchanged):
 def _recorded_controller(
     scene: Scene, time: Timebase, kinds: dict[str, type[Element]], recorded: frozenset[str]
 ) -> Controller:
-    """Makes a controller of samples (x, acceleration, velocity) that takes recorded values in place of estimates."""
+    """Makes a controller of samples (x, acceleration, velocity) that uses recorded values in place of estimates."""
     controller = Controller(scene, time, kinds)
     places = {"acceleration": 1, "velocity": 2}
     controller.params = replace(controller.params, **{of: Recorded(places[of]) for of in recorded})

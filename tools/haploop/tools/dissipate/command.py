@@ -1,4 +1,4 @@
-"""``haploop dissipate``: reads a recording, makes the controller that works on it, books, prints and draws."""
+"""``haploop dissipate``: reads a recording, makes the controller that works on it, books energy, prints and draws."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _OWN_COLUMNS = (
 )
 _LONGEST_DELAY_S = 60.0
 Kinds = Mapping[str, "type[Element]"]
-# Tables that can be overridden; [encoder] tells the estimators to what the positions were rounded.
+# Tables that can be overridden; [encoder] tells the estimators to which step the positions were rounded.
 _ESTIMATES = ("velocity", "acceleration", "encoder")
 _ESTIMATED = frozenset({"velocity", "acceleration"})
 
@@ -59,7 +59,7 @@ class Selection:
     overrides: Sequence[str] = ()
 
     def tables(self) -> frozenset[str]:
-        """Returns the tables that the overrides change; RecordingError where one is of another table."""
+        """Returns the tables that the overrides change; raises RecordingError where one is for another table."""
         found = set()
         for text in self.overrides:
             table = (key_path(text.partition("=")[0]) or [text])[0]
@@ -94,7 +94,7 @@ class Request:
 
 
 def dissipate(request: Request, as_json: bool) -> None:
-    """Books, prints the table, draws the figure and names its file."""
+    """Books the energy, prints the table, draws the figure and prints the name of its file."""
     with plain_errors():
         try:
             outcome = compute_outcome(request, kinds_with(request.plugins))
@@ -127,7 +127,7 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
             )
     makings = scene, recording.period_s, recording.delay_s, kinds, recording.recorded, recording.has_force
     booking, noisier = Booking(*makings), Booking(*makings)
-    # Of positions alone: what is recorded beside them does not come of their noise.
+    # For positions alone: a velocity or acceleration recorded beside them does not depend on their noise.
     noise = PositionNoise() if isinstance(recording, TextRecording) and not recording.recorded else None
     all_of = None if scene.dissipation else _scene_of_all(request, scene, kinds)
     trying = Booking(all_of, *makings[1:-1]) if all_of else None
@@ -153,7 +153,7 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
 
 
 def _scene_of_all(request: Request, scene: Scene, kinds: dict[str, type[Element]]) -> Scene | None:
-    """Returns the scene with every element that acts on a recorded motion, at a size of 1; None where one cannot."""
+    """Returns the scene with every element that acts on a recorded motion, at a size of 1; None where it is refused."""
     inward = ["unidirectional-damping damping=1"] if scene.wall else []
     selection = replace(request.selection, dampings=["1"], masses=["1"], elements=inward)
     with suppress(RecordingError):
@@ -221,7 +221,7 @@ def make_scene_for_log(selection: Selection, path: Path, scene: Scene, kinds: Ki
 
 
 def _make_scene(bare: Scene, selection: Selection, path: Path, kinds: Kinds) -> Scene:
-    """Resolves a scene with the selected wall, elements and estimates, in the words in which they were given."""
+    """Resolves a scene with the selected wall, elements and estimates, worded as they were given."""
     layers = Layers(path, bare.as_dict())
     if selection.wall is not None:
         wall = {"position": _value(selection.wall), "stiffness": 0.0, "occupies": selection.occupies}

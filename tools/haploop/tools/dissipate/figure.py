@@ -24,7 +24,7 @@ _AT = (0.04, 0.46, 0.585, 0.71, 0.835, 1.0)
 _MOST = len(style.ELEMENTS)
 # Letters of a line, at most.
 _LINE_LETTERS = 170
-# Height of a line of notes, and of one of what is answered, and how many of these there are at most.
+# Heights of a line of the notes and of a line of the answer, and how many lines an answer has at most.
 _LINE_IN, _ANSWER_IN, _MOST_ANSWER_LINES = 0.17, 0.22, 4
 _CORNER: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.0, 1.0), "ncols": 1}
 
@@ -32,7 +32,7 @@ _CORNER: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.0, 1.0), "n
 def make_figure(outcome: Outcome) -> Figure:
     """Draws motion and energies, whole and in detail, the table, and notes; FigureError where matplotlib is missing.
 
-    Where neither an element nor a force was named there are no energies: it draws the motion alone.
+    Where neither an element nor a force was named there are no energies, and only the motion is drawn.
     """
     words, answer = _words(outcome), _answer(outcome)
     above_in, below_in = 0.4 + _ANSWER_IN * len(answer), _LINE_IN * len(words)
@@ -85,7 +85,7 @@ def _draw_energies(body: SubFigure, outcome: Outcome) -> None:
 
 
 def _motion(ax: Axes, outcome: Outcome, lines: Floats, title: str, whole: bool) -> None:
-    """Draws position over time, with the wall as far as it is in view; the ``whole`` of it to the wall, with buzzes."""
+    """Draws position over time with the wall in view; the ``whole`` motion as far as the wall, and with its buzzes."""
     factor, letter = prefix_for([float(np.abs(lines[1]).max())])
     t, x = lines[0], lines[1] / factor
     low, high = float(x.min()), float(x.max())
@@ -123,7 +123,7 @@ def _buzzes(ax: Axes, outcome: Outcome) -> None:
 
 
 def _energies(ax: Axes, outcome: Outcome, lines: Floats, title: str) -> None:
-    """Draws the books of the elements: true ones drawn through, sampled ones dashed where they differ."""
+    """Draws the books of the elements: true ones as solid lines, sampled ones dashed where they differ."""
     count, agree, curves = len(outcome.elements), outcome.books_agree, []
     for index, element in enumerate(outcome.elements[:_MOST]):
         colour, name = style.element_colour(index), element.label
@@ -158,7 +158,7 @@ def _force_energies(ax: Axes, outcome: Outcome, lines: Floats) -> None:
 def _curves(
     ax: Axes, outcome: Outcome, t: Floats, curves: list[tuple[Floats, dict[str, Any]]], title: str, name: str, unit: str
 ) -> None:
-    """Draws curves over time, each with its look, in one unit with the prefix that suits them."""
+    """Draws curves over time, each with its look, in a common unit with the prefix that suits them."""
     factor, letter = prefix_for([max(float(np.abs(values).max()) for values, _ in curves)])
     for values, look in curves:
         ax.plot(t, values / factor, **look)

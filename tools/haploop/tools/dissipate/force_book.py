@@ -1,4 +1,4 @@
-"""The work of a recorded force: the sum F v T that is often taken for it, and what its true book says of passivity."""
+"""The work of a recorded force: the sum F v T that is often taken for it, and its passivity by its true book."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import numpy as np
 from haploop.tools.dissipate.recording.samples import Floats, Samples
 
 Passivity = Literal["passive", "fed the buzz", "generated", "other sign", "unresolved", "begins loaded"]
-# The terms of a sum that cancel leave so much of them.
+# Share of the terms of a sum that rounding leaves over where they cancel.
 _ROUNDING = 1e-12
-# A wall takes energy before it gives any; of a force that took less than this share of what it gave, ask for the sign.
+# A wall takes energy before it gives any: the sign of a force that took less than this share of what it gave is in
+# doubt.
 _TOOK_FIRST = 0.01
 
 
 class ForceRows(NamedTuple):
-    """A recorded force at some samples, N, and what it took out of the device since its beginning, J; (samples,)."""
+    """A recorded force at some samples, N, and the energy it has taken out of the device so far, J; (samples,)."""
 
     force_N: Floats
     true_J: Floats
@@ -24,15 +25,15 @@ class ForceRows(NamedTuple):
 
 
 class ForceBook:
-    """The naive sum of a recorded force, and how much it gave out that it had not taken.
+    """The naive sum of a recorded force, and how much more energy it gave out than it had taken.
 
-    naive  E += -F[k] v[k] T of every sample whose hold is booked; with v from a backward difference each force is
-           multiplied by the way that led to it, not by the way that it acts on: a sampled spring K pushed in to x and
-           let out at a speed v generates K x v T, and this sum says that it dissipated as much.
+    naive  E += -F[k] v[k] T for every sample whose hold is booked; with v from a backward difference each force is
+           multiplied by the displacement that led to it, not by the displacement over which it acts: a sampled spring
+           K pushed in to x and let out at a speed v generates K x v T, and this sum says that it dissipated as much.
 
-    A force generates where it has given out more than it took since it was last known to be at rest: since the
-    beginning, or the end of a gap, with F = 0. Rounding positions to counts of q moves the energy up to a sample by at
-    most q/2 (sum |dF| + |F|) (summed by parts), so what is below that may come of rounding.
+    A force generates energy where it has given out more than it took since it was last known to be at rest: since the
+    beginning, or the end of a gap, with F = 0. Rounding positions to counts of q changes the energy up to a sample by
+    at most q/2 (sum |dF| + |F|) (summed by parts), so anything below that may be due to rounding.
 
     Args:
         delay_s: from a sample to its force; after a gap, forces still in flight are not known.
@@ -54,7 +55,7 @@ class ForceBook:
         Args:
             v_m_s: velocity at its samples.
             added_J: gain of the force's true book over the period before each sample; 0 at the beginning.
-            true_J: that book, as it stands at each sample.
+            true_J: the value of that book at each sample.
         """
         force, x = piece.force_N, piece.true_x_m
         assert force is not None

@@ -1,4 +1,4 @@
-"""The sign of a recorded force, by how its slow part stands to the position: that of a wall pushes back."""
+"""The sign of a recorded force, from how its slow part correlates with the position: a wall's force pushes back."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ import numpy as np
 
 from haploop.tools.dissipate.recording.samples import Floats
 
-# A buzz averages out of means over so long, s; fewer of them, or ones that agree less, tell nothing.
+# Length of the means, s, in which a buzz averages out; fewer means than this, or a weaker correlation, show nothing.
 _BLOCK_S, _LEAST_BLOCKS, _AGREE = 0.25, 8, 0.7
-# Share of the variance of the force that its means must hold: an inertia's force is that of the fastest motion.
+# Least share of the force's variance that is in its means: an inertia's force is that of the fastest motion.
 _SLOW = 0.1
 
 
 class ForceSign:
     """Correlates means of force and position over a quarter of a second each.
 
-    The force of a wall or a spring is the larger the further in the device is, and pushes it out: they go against each
-    other. A damper's goes with neither; an inertia's goes with the position, but little of it is slow.
+    The force of a wall or a spring grows the further in the device is, and pushes it out: force and position vary in
+    opposite directions. A damper's force varies neither way with the position; an inertia's varies in the same
+    direction, but little of it is slow.
     """
 
     def __init__(self, period_s: float) -> None:
@@ -26,7 +27,7 @@ class ForceSign:
         self._squares_N2 = 0.0
 
     def add(self, x_m: Floats, force_N: Floats, begins: bool) -> None:
-        """Adds samples in order, shape (samples,) each; ``begins``: after the beginning, or a gap."""
+        """Adds samples in order, shape (samples,) each; ``begins``: they are the first, or follow a gap."""
         rows = np.concatenate([self._left[:, : 0 if begins else None], [x_m, force_N]], axis=1)
         whole = rows.shape[1] // self._samples * self._samples
         blocks = rows[:, :whole].reshape(2, -1, self._samples)
@@ -36,7 +37,7 @@ class ForceSign:
 
     @property
     def pushes_back(self) -> bool | None:
-        """Whether the force pushes back, as one of a wall does, or pulls further in; None where neither is seen."""
+        """Whether the force pushes back, as a wall's does, or pulls further in; None where neither is seen."""
         x, force = np.concatenate([np.empty((2, 0)), *self._means], axis=1)
         if len(x) < _LEAST_BLOCKS or not np.ptp(x) or not np.ptp(force):
             return None

@@ -21,13 +21,13 @@ from haploop.tools.dissipate.trace import Trace
 from haploop.tools.render.units import amount
 from haploop.view.look.spectrum import Line
 
-# Both have a name, the control period and the delay of the forces in s, ``between``: what the motion between samples is
-# taken from, ``recorded``: which of "velocity" and "acceleration" are not estimated, ``has_force``, and notes, complete
-# once all samples have been read.
+# Both have a name, the control period and the delay of the forces in s, ``between`` (what the motion between samples is
+# taken from), ``recorded`` (which of "velocity" and "acceleration" are not estimated), ``has_force``, and notes, which
+# are complete once all samples have been read.
 Recording = LogRecording | TextRecording
-# Where no element is named those at hand are tried at sizes of this largest force.
+# Where no element is named, the available ones are tried at the sizes that give this largest force.
 EQUAL_N = 0.1
-# The terms of a sum that cancel leave so much of them.
+# Share of the terms of a sum that rounding leaves over where they cancel.
 _ROUNDING = 1e-12
 # Lines closer than this are the same.
 _SAME_HZ = 1.0
@@ -41,8 +41,9 @@ class ElementOutcome:
         label: kind and parameters in short: "damping 2.7 N s/m", "my element (mass 1.80 g, damping 0.1 N s/m)".
         sampled_J, true_J: its books at the end; positive: taken out of the device.
         taken_J, given_J: energy taken in the periods in which it dissipates, and given back in the others (true books).
-        fast_share: of its mean square force, what is faster than a quarter of the sampling rate, see ``Booking``.
-        noisier_J: its true book on the positions with as much noise again as they have; None where rates were recorded.
+        fast_share: share of its mean square force that is faster than a quarter of the sampling rate, see ``Booking``.
+        noisier_J: its true book on the positions with as much noise added as they have; None where velocity or
+            acceleration was recorded.
     """
 
     kind: str
@@ -58,12 +59,12 @@ class ElementOutcome:
 
     @property
     def is_fast(self) -> bool:
-        """Tells whether much of its force is faster than a buzz at 0.15 of the sampling rate would make it."""
+        """Tells whether more of its force is fast than a buzz at 0.15 of the sampling rate would cause."""
         return self.fast_share > 0.2
 
     @property
     def is_moved_by_noise(self) -> bool:
-        """Tells whether noise of the positions makes a tenth of its energy, as far as that is known."""
+        """Tells whether noise of the positions changes its energy by more than a tenth, as far as that is known."""
         return self.noisier_J is not None and abs(self.noisier_J - self.true_J) > 0.1 * abs(self.true_J)
 
 
@@ -72,11 +73,11 @@ class ForceOutcome:
     """The work of a recorded force, positive where it was taken out of the device.
 
     Attributes:
-        books: as those of an element.
+        books: like those of an element.
         naive_J: the sum -F v T over the same samples.
         excess_J: the most that it gave out beyond what it had taken.
-        pushes_back: whether it does, as that of a wall, or pulls further in; None where neither is seen. That of a log
-            is known to.
+        pushes_back: whether it pushes back, as a wall's does, or pulls further in; None where neither is seen. A force
+            in a log is known to push back.
     """
 
     books: ElementOutcome
@@ -87,7 +88,7 @@ class ForceOutcome:
 
     @property
     def sign_is_known(self) -> bool:
-        """Tells whether nothing speaks for the other sign."""
+        """Tells whether nothing suggests the other sign."""
         return self.pushes_back is not False and self.passivity != "other sign"
 
     def as_data(self) -> dict[str, Any]:
@@ -97,19 +98,20 @@ class ForceOutcome:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of the elements, in the order of their selection, on a recording, with the controller's scene.
+    """The outcome of the elements on a recording, in the order of their selection, with the controller's scene.
 
     Attributes:
-        force: that of a recorded force; None where there was none.
-        noise_m: noise of the recorded positions; None where rates were recorded beside them.
+        force: outcome of a recorded force; None where there was none.
+        noise_m: noise of the recorded positions; None where velocity or acceleration was recorded beside them.
         buzz_word, buzz: whether the recording buzzes, and the buzz.
-        slow: the widest line of a slower motion; None of one without.
-        tried: where no element was named, those at hand at sizes of equal largest force, ``EQUAL_N``, best first.
+        slow: the widest line of a slower motion; None without one.
+        tried: where no element was named, the available ones at sizes of equal largest force, ``EQUAL_N``, best first.
         left_out: a line that was taken for the shape of a slower motion, where no buzz was seen.
-        several: swings at several frequencies at once, where there was no buzz at one.
-        fast_rms_m: by how much it moves above 15 Hz, r.m.s., for a second or more.
-        short_s: how long parts between gaps lasted together that were too short for a buzz to be seen in.
-        hidden: a swing within the counts of the positions, because of which it cannot be said whether it buzzes.
+        several: swings at several frequencies at once, where there was no buzz at a single one.
+        fast_rms_m: r.m.s. motion above 15 Hz that lasts a second or more.
+        short_s: total length of the parts between gaps that were too short for a buzz to be seen in them.
+        hidden: a swing within the counts of the positions, because of which it cannot be said whether the recording
+            buzzes.
         slower: a swing at one frequency from some 3 Hz up to that of a buzz, where there were not several.
     """
 
@@ -132,7 +134,7 @@ class Outcome:
 
     @property
     def main_Hz(self) -> float | None:
-        """Returns the frequency of the buzz, the widest of several, or that of a slower motion; None of others."""
+        """Returns the frequency of the buzz, of the widest of several, or of a slower motion; None without any."""
         if self.several:
             return self.several.lines[0][0]
         line = self.buzz or self.slower or self.slow
@@ -152,7 +154,7 @@ class Outcome:
         )
 
     def as_data(self) -> dict[str, Any]:
-        """Everything but the trace, for JSON."""
+        """Returns everything but the trace, for JSON."""
         recording, (from_s, to_s) = self.recording, self.span_s
         notes = asdict(recording.notes)
         return {
@@ -182,7 +184,7 @@ class Outcome:
 
 
 def _buzz_data(buzz: Buzz | None) -> dict[str, Any] | None:
-    """Returns a buzz for JSON, a table a span."""
+    """Returns a buzz for JSON, with one table per span."""
     if not buzz:
         return None
     spans = [span._asdict() for span in buzz.spans]
@@ -198,7 +200,7 @@ def make_outcome(
     noisier: tuple[float, Floats] | None,
     found: BuzzFinder,
 ) -> Outcome:
-    """Makes the outcome; ``noisier`` are the noise of the positions, m, and the true books with as much again."""
+    """Makes the outcome; ``noisier``: the noise of the positions, m, and the true books with as much noise added."""
     noise_m, noisier_J = (noisier[0], noisier[1].tolist()) if noisier else (None, [None] * len(scene.dissipation))
     columns = (
         booking.sampled_J,
@@ -226,7 +228,7 @@ def make_outcome(
         # The sign of a force in a log is known.
         pushes_back = isinstance(recording, LogRecording) or booking.force_sign.pushes_back
         word: Passivity = "generated" if of.passivity == "other sign" and pushes_back else of.passivity
-        # What the contact stored before hides what the force gives to a buzz.
+        # Energy that the contact stored before hides what the force gives to a buzz.
         word = "fed the buzz" if word == "passive" and buzz and buzz.is_fed else word
         force = ForceOutcome(own, of.naive_J, word, of.excess_J, pushes_back)
     return Outcome(
@@ -249,15 +251,16 @@ def make_outcome(
 
 
 def _apart(slower: Buzz | None, buzz: Buzz | None) -> Buzz | None:
-    """Returns the slower swing; None where it is the buzz, at the border that both bands share."""
+    """Returns the slower swing; None where it is the buzz itself, at the border that both bands share."""
     is_same = slower and buzz and abs(slower.frequency_Hz - buzz.frequency_Hz) < _SAME_HZ
     return None if is_same else slower
 
 
 def make_tried(booking: Booking, scene: Scene, kinds: Mapping[str, type[Element]]) -> list[ElementOutcome]:
-    """Makes the outcomes of elements at the sizes at which their largest force is ``EQUAL_N``; none of one without.
+    """Makes the outcomes of elements at the sizes at which their largest force is ``EQUAL_N``; none without a force.
 
-    Their forces are in proportion to their one parameter, and so are their energies, which were booked at a size of 1.
+    Forces are proportional to the one parameter of each element, and so are the energies, which were booked at a size
+    of 1.
     """
     tried = []
     for row, table in enumerate(scene.dissipation):

@@ -57,7 +57,7 @@ _AT_HAND = "what each element at hand would have taken, at a size of the same la
 _OTHERS = f"Others, or other sizes, are booked where they are named: {_NAME}"
 _NO_FORCE = "none of these would have given a force on this motion"
 _BESIDE_WALL = "{none}: it lies from {low} to {high}, and the wall {occupies} {wall}."
-# An inertia above this, kg, is more often a mass in grams: the heaviest device that comes with haploop has 0.2 kg.
+# An inertia above this, kg, was more often meant in grams: the heaviest device that comes with haploop has 0.2 kg.
 _HEAVY_KG = 0.5
 _HEAVY = '{label}: a mass without a unit is in kg; is that what was meant? 1.8 g is --mass "1.8 g" or --mass 0.0018.'
 # Counts of the notes, and what each of them means.
@@ -78,7 +78,7 @@ _COUNTS = {
 
 
 def make_report(outcome: Outcome) -> RenderableType:
-    """Makes the report: doubts, whether it buzzes, conclusion, table and notes."""
+    """Makes the report: doubts, whether the recording buzzes, conclusion, table and notes."""
     numbers = ("true", "sampled", "took", "gave back", "largest force")
     table = make_table("taken out of the device", *numbers, numbers=numbers)
     for element in rows(outcome):
@@ -95,7 +95,7 @@ def make_report(outcome: Outcome) -> RenderableType:
 
 
 def _tried(outcome: Outcome) -> Table:
-    """Makes the table of elements at sizes of equal largest force, where none was named."""
+    """Makes the table of the elements tried at sizes of equal largest force because none was named."""
     numbers = ("takes", "gives back", "fast")
     table = make_table(f"{amount(EQUAL_N, 'N')} at most", *numbers, numbers=numbers)
     for each in outcome.tried:
@@ -104,7 +104,7 @@ def _tried(outcome: Outcome) -> Table:
 
 
 def rows(outcome: Outcome) -> list[ElementOutcome]:
-    """Returns what has books: the elements, and a recorded force last."""
+    """Returns everything that has books: the elements, and a recorded force last."""
     return [*outcome.elements, *([outcome.force.books] if outcome.force else [])]
 
 
@@ -115,7 +115,7 @@ def make_row(element: ElementOutcome) -> tuple[str, ...]:
 
 
 def conclusion(outcome: Outcome) -> str:
-    """Returns who would have dissipated most, and who would have fed the motion; of a force alone its work."""
+    """Returns which element would have dissipated most and which would have fed the motion; for a force, its work."""
     if not outcome.elements and outcome.force:
         return _passivity(outcome)
     if not outcome.elements:
@@ -195,13 +195,13 @@ def note_sentences(outcome: Outcome) -> list[str]:
 
 
 def doubtful(outcome: Outcome) -> list[str]:
-    """Returns what stands before the answer: that it may be wrong, and why."""
+    """Returns the sentences that precede the answer: that it may be wrong, and why."""
     pulls = [_PULLS] if outcome.force and outcome.force.pushes_back is False else []
     return [*uneven(outcome), *outcome.recording.notes.remarks, *pulls, *filtered_out(outcome)]
 
 
 def uneven(outcome: Outcome) -> list[str]:
-    """Returns that energies and rate may be wrong, where much of the times is uneven."""
+    """Returns the warning that energies and rate may be wrong, where many of the periods are uneven."""
     notes = outcome.recording.notes
     return [_MAY_BE_WRONG.format(percent=100.0 * notes.uneven / notes.rows)] if notes.is_uneven else []
 
@@ -234,7 +234,7 @@ def _passivity(outcome: Outcome) -> str:
 
 
 def _given_or_taken(taken_J: float) -> str:
-    """Returns in words what has a sign in the table, where positive is taken out of the device."""
+    """Returns in words what the table shows by the sign, where positive is taken out of the device."""
     size = amount(abs(taken_J), "J")
     return f"gave {size} to the device" if taken_J < 0.0 else f"took {size} out of the device"
 

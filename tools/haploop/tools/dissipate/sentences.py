@@ -32,14 +32,14 @@ _BUZZ: dict[Word, str] = {
 _SHORT = (
     " Parts between gaps that last less than {lasts:g} s, {short} in all, are too short to tell: a buzz may be in them."
 )
-# Less of them is not worth a sentence.
+# Short parts that last less than this in all are not mentioned.
 _LEAST_SHORT_S = 0.1
 _HIDDEN = (
     "Whether the recording buzzes cannot be said: a swing at {at:.1f} Hz, {width} peak to peak, would be felt, but it "
     "is within {counts} counts of the positions, {count} each, as their staircase may be. Record with a finer encoder."
 )
 _ONE_HZ, _MOVING_HZ = "{0:.1f} Hz (give or take {1:g} Hz)", "{0:.0f} to {1:.0f} Hz"
-# Of so many spans with frequencies of their own each is told.
+# Up to this many spans with different frequencies are described one by one.
 MOST_SPANS = 4
 _SPAN = "{frequency} ({width}) from about {from_s:.1f} s to {to_s:.1f} s"
 _LINE = "{0:.1f} Hz, {1}"
@@ -70,7 +70,7 @@ _FAST = (
     " It moves by {rms} r.m.s. above {above:g} Hz for a second or more, at no frequency that lasts: so do a hand's "
     "fast motion, blows, noise, bursts of half a second and what dies away, but an irregular buzz, too."
 )
-# So many times the noise of single positions.
+# Motion is beyond noise from this many times the noise of single positions on.
 _BEYOND_NOISE = 3.0
 _HAND = " Its widest swing is at {main:.3g} Hz, {width} peak to peak at most, which a hand can, too."
 NEXT = (
@@ -89,7 +89,7 @@ _NO_LOW_PASS = (
     "No low-pass of the estimates suits, since the motion itself swings at {main:.3g} Hz; record it with a finer or "
     "faster encoder."
 )
-# Cutoffs, Hz, and at least so many times the frequency at which the motion swings.
+# Cutoffs, Hz, which are at least this many times the frequency at which the motion swings.
 _CUTOFFS, _ABOVE_MAIN = {"acceleration": 20.0, "velocity": 50.0}, 3.0
 _FILTERED_OUT = (
     "{name}.cutoff = {cutoff:g} Hz is no more than the {main:.3g} Hz at which the motion swings: it filters out that "
@@ -98,7 +98,7 @@ _FILTERED_OUT = (
 
 
 def buzz_sentence(outcome: Outcome) -> str:
-    """Returns whether the recording buzzes: at which frequency, how wide, when."""
+    """Returns in words whether the recording buzzes: at which frequency, how wide and when."""
     limits: dict[str, Any] = {
         "above": ABOVE_HZ,
         "lasts": LASTS_S,
@@ -142,7 +142,7 @@ def _slower(outcome: Outcome, also: str = "") -> str:
 
 
 def buzzing(outcome: Outcome) -> list[tuple[float, float, str]]:
-    """Returns each stretch in which the recording buzzes: from when to when, s, and its frequencies in words."""
+    """Returns each stretch in which the recording buzzes: its begin and end, s, and its frequencies in words."""
     if several := outcome.several:
         return [(several.from_s, several.to_s, " and ".join(f"{at_Hz:.1f} Hz" for at_Hz, _ in several.lines))]
     if not (buzz := outcome.buzz):
@@ -153,7 +153,7 @@ def buzzing(outcome: Outcome) -> list[tuple[float, float, str]]:
 
 
 def _told(buzz: Buzz) -> dict[str, str]:
-    """Returns at which frequency it swings, how wide and when; spans with frequencies of their own by themselves."""
+    """Returns frequency, width and time of a swing in words; spans with different frequencies one by one."""
     moves = _moves(buzz.least_Hz, buzz.most_Hz, buzz)
     of_Hz = (buzz.least_Hz, buzz.most_Hz) if moves else (buzz.frequency_Hz, buzz.within_Hz)
     told = {"frequency": (_MOVING_HZ if moves else _ONE_HZ).format(*of_Hz), "width": amount(buzz.width_m, "m")}
@@ -185,7 +185,7 @@ def _frequency(span: Span, buzz: Buzz) -> str:
 
 
 def _course(buzz: Buzz) -> str:
-    """Returns what became of the width of a buzz of one stretch."""
+    """Returns in words how the width of a buzz of one stretch changed."""
     if buzz.course is None:
         return ""
     told = {"first": buzz.first_m, "last": buzz.last_m, "least": buzz.least_m, "widest": buzz.width_m}
@@ -201,7 +201,7 @@ def _fed(buzz: Buzz, sign_is_known: bool) -> str:
 
 
 def filtered_out(outcome: Outcome) -> list[str]:
-    """Returns which cutoffs filter out the swing of the motion itself."""
+    """Returns a sentence on each cutoff that filters out the swing of the motion itself."""
     main_Hz, found = outcome.main_Hz, []
     for name in ("velocity", "acceleration"):
         cutoff = None if name in outcome.recording.recorded else outcome.scene.estimate(name).cutoff
@@ -211,7 +211,7 @@ def filtered_out(outcome: Outcome) -> list[str]:
 
 
 def low_pass(outcome: Outcome) -> str:
-    """Returns which cutoffs take noise out of the estimates, and leave the swing of the motion in."""
+    """Returns in words which cutoffs remove noise from the estimates but keep the swing of the motion."""
     least_Hz = _ABOVE_MAIN * (outcome.main_Hz or 0.0)
     if least_Hz > 0.25 / outcome.recording.period_s:
         return _NO_LOW_PASS.format(main=outcome.main_Hz)

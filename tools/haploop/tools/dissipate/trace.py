@@ -1,4 +1,4 @@
-"""The books of a recording over its time, for a figure."""
+"""The books of a recording over time, for a figure."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ class Trace:
     """Keeps the books of a recording of any length in bounded memory, decimated with their extremes kept.
 
     Args:
-        rows: of ``lines``: t, x, sampled and true books of every element, rows of a recorded force.
+        rows: number of rows of ``lines``: t, x, sampled and true books of every element, rows of a recorded force.
 
     Attributes:
-        close: in full, the interval in which most was given back, rows like those of ``lines``; None before any was.
+        close: the interval in which most energy was given back, undecimated, with rows like those of ``lines``; None
+            before any was given back.
     """
 
     def __init__(self, period_s: float, rows: int) -> None:
@@ -46,13 +47,13 @@ class Trace:
         done = left[:, :whole] if self._group == 1 else extremes(left[:, :whole], self._group)
         self._left, self._points = left[:, whole:], np.hstack([self._points, done])
         while self._points.shape[1] > _MOST:
-            # What is left of a group of four are the newest points; they stay as they are.
+            # The newest points, which do not make up a group of four, stay unchanged.
             usable = self._points.shape[1] // 4 * 4
             self._points = np.hstack([extremes(self._points[:, :usable], 4), self._points[:, usable:]])
             self._group = max(4, 2 * self._group)
 
     def _look_closely(self, tagged: Floats) -> None:
-        """Compares intervals of equal length that overlap by half, by what was given back, in the last row."""
+        """Compares intervals of equal length that overlap by half, by the energy given back in them (the last row)."""
         waiting = np.hstack([self._open, tagged])
         while waiting.shape[1] >= self._span:
             self._consider(waiting[:, : self._span])

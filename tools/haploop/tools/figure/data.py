@@ -17,7 +17,7 @@ from haploop.protocol.scene.scene import ElementTable, Scene, Wall
 from haploop.tools.figure.scene_units import declared_units, element_units
 
 Floats = np.ndarray
-# What the close view shows of the last contact at most, and the loops of the beginning.
+# Longest time of the last contact that the close view shows, and of the first that the loops show, s.
 _CLOSE_S, _EARLY_S = 0.2, 1.0
 TOGETHER = "together"
 
@@ -33,7 +33,7 @@ class ElementSpan:
     Attributes:
         from_tick, to_tick: ticks covered, half-open; the end is infinite while it is at work.
         slots: (place in the list of elements, from_tick, to_tick): where its force is in the log.
-        name: as its book is called in the log: the kind, numbered from the second of a kind on.
+        name: name of its book in the log: the kind, numbered from the second of a kind on.
     """
 
     element: ElementTable
@@ -53,7 +53,7 @@ class History:
 
     Attributes:
         elements: every element that was ever at work, in the order of their books.
-        walls: the wall and what became of it; empty without one.
+        walls: the wall and its changes; empty without one.
         into_wall: direction that leads into the wall, +1.0 or -1.0.
     """
 
@@ -68,7 +68,7 @@ class History:
                 self.walls.append(WallSpan(span.from_tick, wall))
             for place, element in enumerate(span.scene.dissipation):
                 self._follow(element, place, span)
-        # What was replaced in the tick of its coming has no book.
+        # An element replaced in the tick in which it came has no book.
         self.elements = [span for span in self.elements if span.to_tick > span.from_tick]
         for number, span in enumerate(self.elements):
             kind = span.element.name
@@ -76,7 +76,7 @@ class History:
             span.name = f"{kind}-{same + 1}" if same else kind
 
     def _follow(self, element: ElementTable, place: int, span: Span) -> None:
-        """Goes on with an element that was at work up to this span, at this place or another, or begins a new one."""
+        """Continues an element that was at work up to this span, at this place or another, or begins a new one."""
         goes_on = (known for known in self.elements if known.element is element and known.to_tick == span.from_tick)
         found = next(goes_on, None)
         if found is None:
@@ -109,8 +109,8 @@ class RunData:
 
     Attributes:
         controller, energy: columns at every tick, with ``timestamp``.
-        t_s, x_m, v_m_s, force_N: the motion at every plant step and the force applied from there on; at every tick
-            what the controller measured and asked for, where the plant was not logged (``every_step`` is False).
+        t_s, x_m, v_m_s, force_N: the motion at every plant step and the force applied from there on; where the plant
+            was not logged (``every_step`` is False), what the controller measured and commanded at every tick.
         bodies_m, plant_forces_N: positions of the bodies beyond x, and forces of the plant's own effects, by name, at
             the same times.
         cut: where the log ends if it was cut off, else "".
@@ -150,7 +150,7 @@ class RunData:
         if (scene := recorded_scene(directory, log.attachments)) is None:
             raise FigureError(f"There is neither a scene in the log in {directory} nor a scene.toml beside it.")
         plant = log.get("/plant")
-        if plant and len(plant["t"]) < 2:  # of a plant that was killed before it told of a tick
+        if plant and len(plant["t"]) < 2:  # the plant was killed before it reported a tick
             plant = None
         motion = plant or {**controller, "t": controller["timestamp"], "force": controller["total"]}
         forces = {name: motion[name] for name in ("actuator", "friction") if name in motion}
@@ -200,7 +200,7 @@ class RunData:
     def close_s(self) -> tuple[float, float]:
         """Returns the time of the close view: the last contact, or the end of a run without any."""
         first, last = self.span_s
-        # Of a run that failed, or was killed, the log of the controller may go on beyond that of the plant.
+        # In a run that failed or was killed, the log of the controller may extend beyond that of the plant.
         moves_until = float(self.t_s.max(initial=first))
         contact = self.contact_s()
         contact = contact[contact <= moves_until]
@@ -212,14 +212,14 @@ class RunData:
         return max(first, float(recent[0]) - margin), min(last, float(recent[-1]) + margin)
 
     def early_s(self, from_tick: int = 0) -> tuple[float, float]:
-        """Returns the first second of contact from a tick on, or of a run without any."""
+        """Returns the first second of contact from a tick on, or the first second of a run without any."""
         contact = self.contact_s()
         contact = contact[contact >= from_tick / self.control_rate]
         first = float(contact[0]) if len(contact) else self.span_s[0]
         return first, first + _EARLY_S
 
     def wall_table_at(self, t_s: float) -> Wall | None:
-        """Returns the table of the wall as it stood at a time, None without a wall."""
+        """Returns the table of the wall as it was at a time, None without a wall."""
         walls = [span.wall for span in self.history.walls if span.from_tick / self.control_rate <= t_s]
         return walls[-1] if walls else None
 

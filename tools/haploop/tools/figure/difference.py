@@ -1,4 +1,4 @@
-"""Differences of two runs: keys of their scenes, what came of them, and the tick at which they part."""
+"""Differences between two runs: keys of their scenes, their results, and the tick at which they part."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Pair = tuple[Any, Any]
 
 @dataclass(frozen=True)
 class Parting:
-    """First tick at which a logged column of the controller differs in a bit."""
+    """The first tick at which a logged column of the controller differs in any bit."""
 
     tick: int
     at_s: float
@@ -35,12 +35,12 @@ class Difference:
 
     Attributes:
         runs: the names of their directories; names: their titles.
-        scene: dotted key -> both values, where they are not the same; None where one scene has no such key.
+        scene: dotted key -> both values, where they differ; None where one scene has no such key.
         units: of the numbers among these keys, "" for none.
-        results: what came of each run, by words: verdict, end, hash.
-        energies_J: by the name of the book, in J; None where one has no such book.
-        ticks: that both logs hold.
-        parting: where they part; None where all of these ticks are the same, or are not to be compared (``why_not``).
+        results: results of both runs, by name: verdict, end, hash.
+        energies_J: by the name of the book, in J; None where one run has no such book.
+        ticks: number of ticks that both logs hold.
+        parting: where they part; None where all of these ticks are the same, or cannot be compared (``why_not``).
     """
 
     runs: tuple[str, str]
@@ -55,7 +55,7 @@ class Difference:
 
 
 def difference(a: RunData, b: RunData, *, runs: tuple[str, str] = ("first", "second")) -> Difference:
-    """Returns what two runs, called ``runs``, differ in; of one that was killed, as far as its log goes."""
+    """Returns the differences between two runs, called ``runs``; one that was killed counts as far as its log goes."""
     ticks, parting, why_not = _parting(a, b)
     results = [_results(run) for run in (a, b)]
     energies = [_energies_J(run) for run in (a, b)]
@@ -74,7 +74,7 @@ def difference(a: RunData, b: RunData, *, runs: tuple[str, str] = ("first", "sec
 
 
 def unlike_keys(scenes: Sequence[Scene]) -> dict[str, tuple[Any, ...]]:
-    """Returns the dotted keys that are not the same in all scenes, with the value in each; the title is none."""
+    """Returns the dotted keys whose values differ between scenes, with the value in each; the title does not count."""
     flat = [dict(_leaves(scene.as_dict())) for scene in scenes]
     keys = dict.fromkeys(key for one in flat for key in one if key != "title")
     found = {key: tuple(one.get(key) for one in flat) for key in keys}
@@ -123,7 +123,7 @@ def _energies_J(run: RunData) -> dict[str, float | None]:
         return {}
     energy = run.summary.get("energy", {})
     books = {book.name: book.ends_J[0] for book in run.books()}
-    if books:  # what has one book alone has all in it
+    if books:  # a single book holds everything
         books[TOGETHER] = [*books.values()][-1]
     return books | {words: energy[key] for key, words in plant_books(energy).items()}
 
@@ -149,7 +149,7 @@ def _parting(a: RunData, b: RunData) -> tuple[int, Parting | None, str]:
 
 
 def difference_of(first: Path, second: Path) -> Difference:
-    """Returns what the runs of two directories differ in; raises what ``RunData.from_directory`` does."""
+    """Returns the differences between the runs of two directories; raises what ``RunData.from_directory`` does."""
     a, b = (RunData.from_directory(directory) for directory in (first, second))
     name_a, name_b = run_names([first, second])
     return difference(a, b, runs=(name_a, name_b))

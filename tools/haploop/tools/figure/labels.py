@@ -1,4 +1,4 @@
-"""Labels on lines and beside points, placed where they cover no other label; what has no room is not written."""
+"""Labels on lines and beside points, placed where they cover no other label; a label without room is not written."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.text import Text
     from matplotlib.transforms import Bbox, BboxBase
 
-# Where a label may stand around its point, the liked ones first, and how far from it, in pixels.
+# Where a label may be placed around its point, preferred places first, and how far from it, in pixels.
 _DIRECTIONS = [(0, 1), (1, 1), (1, 0), (0, -1), (-1, 1), (1, -1), (-1, 0), (-1, -1)]
 _NEAR_PX, _FAR_PX = (2.0, 4.0), (2.0, 4.0, 10.0, 18.0, 28.0, 42.0)
 _AROUND_STAR_PX, _STAR_HALF_PX, _MARKER_PX = (3.0, 13.0, 27.0, 45.0), 7.0, (8.0, 8.0)
@@ -27,9 +27,9 @@ _FRAME = {"boxstyle": "round,pad=0.18", "facecolor": "white", "edgecolor": "none
 
 
 class LabelRoom:
-    """The room for labels in a panel that has its place, size and limits.
+    """The room for labels in a panel whose place, size and limits are fixed.
 
-    No label covers another, or what is marked as taken; what is to be avoided, and then lines, are covered only where
+    No label covers another, or an area marked as taken; areas to be avoided, and then lines, are covered only where
     there is no other place.
     """
 
@@ -73,11 +73,11 @@ class LabelRoom:
     def beside(
         self, x: float, y: float, texts: Sequence[str], colour: str, gid: str, off: Sequence[np.ndarray] = ()
     ) -> None:
-        """Writes the first of some texts, ever shorter, that has room beside a sign, which stays free.
+        """Writes the first of some texts, ever shorter, that has room beside a marker, which stays free.
 
         Args:
-            off: two opposite corners each of areas that it keeps off, in data coordinates, shape (2, 2); where no text
-                can, the last that has room is written on them.
+            off: areas that the text keeps off, each given by two opposite corners in data coordinates, shape (2, 2);
+                where no text can, the last one that has room is written on them.
         """
         from matplotlib.transforms import Bbox
 
@@ -95,7 +95,7 @@ class LabelRoom:
             self.write(*found, color=colour, gid=gid, bbox=_FRAME, zorder=6, fontweight="bold")
 
     def best(self, boxes: Iterable[Bbox], penalty: Callable[[Bbox], Any]) -> Bbox | None:
-        """Returns the first of the boxes with the least penalty that lie in the panel and cover nothing taken."""
+        """Returns the first box with the least penalty among those that lie in the panel and cover nothing taken."""
         inside = (box for box in boxes if self._frame.contains(*box.min) and self._frame.contains(*box.max))
         return min((box for box in inside if not box.count_overlaps(self._taken)), key=penalty, default=None)
 
@@ -119,7 +119,7 @@ class LabelRoom:
 
 @dataclass(frozen=True)
 class Label:
-    """Text for a point, in data coordinates; of every ``group`` at least one is placed. ``half_px`` is the point's."""
+    """Text for a point, in data coordinates; of every ``group`` at least one is placed. ``half_px``: half the point."""
 
     x: float
     y: float
@@ -130,7 +130,7 @@ class Label:
 
 
 def place_labels(ax: Axes, labels: Sequence[Label], lines: Iterable[np.ndarray]) -> None:
-    """Writes labels beside their points; the axes must have their place, size and limits.
+    """Writes labels beside their points; place, size and limits of the axes must be fixed.
 
     Args:
         labels: the important ones first; no label covers the point of another.
@@ -147,7 +147,7 @@ def place_labels(ax: Axes, labels: Sequence[Label], lines: Iterable[np.ndarray])
 
 
 def _place(ax: Axes, room: LabelRoom, label: Label, reach: Sequence[float]) -> bool:
-    """Writes a label at its best free place, with a thin line to its point from afar; tells whether there was one."""
+    """Writes a label at its best free place, with a thin line to a distant point; tells whether there was one."""
     from matplotlib.patheffects import withStroke
 
     at, size = room.pixels((label.x, label.y)), room.size(label.text)
@@ -162,7 +162,7 @@ def _place(ax: Axes, room: LabelRoom, label: Label, reach: Sequence[float]) -> b
 
 
 def around(at: np.ndarray, size: tuple[float, float], distance: float) -> Iterator[Bbox]:
-    """Yields the boxes of a size at a distance from a point, in pixels, the liked ones first."""
+    """Yields the boxes of a size at a distance from a point, in pixels, preferred ones first."""
     for right, up in _DIRECTIONS:
         yield _box(at + np.array((right, up)) * (distance + np.array(size) / 2.0), size)
 

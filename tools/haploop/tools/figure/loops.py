@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 GRAMS = 1e3
-# Points of the curve of a wall that is no spring.
+# Points of the curve of a wall that is not a spring.
 _CURVE = 200
 
 
 def force_position_loop(run: RunData, span_s: tuple[float, float]) -> tuple[Floats, Floats]:
     """Returns penetration (m, positive inside) and force out of the wall (N) at the plant steps of a stretch of time.
 
-    The force is the one applied, total of wall and elements, held while the position moves on. Where it runs
+    The force is the one applied, the total of wall and elements, held while the position moves on. Where the loop runs
     counter-clockwise, the area within is energy given to the device (Choi et al. 2022, Fig. 3).
     """
     t, x, force = within(span_s, run.t_s, run.t_s, run.x_m, run.force_N)
@@ -35,8 +35,8 @@ def force_position_loop(run: RunData, span_s: tuple[float, float]) -> tuple[Floa
 def momentum_loop(run: RunData, span: ElementSpan) -> tuple[Floats, Floats, Floats]:
     """Returns time, velocity v[k-1] and momentum m[k-1] v[k] of a virtual inertia at the ticks it covers.
 
-    m[k] is the mass while it is at work and 0 while it is not. The rectangles of width v[k-1] - v[k-2] and height
-    m v[k] are the energy it takes in a step (Choi et al. 2022, eq. 8 and Fig. 4), so clockwise is dissipation.
+    m[k] is the mass while the inertia is at work and 0 while it is not. The rectangles of width v[k-1] - v[k-2] and
+    height m v[k] are the energy it takes in a step (Choi et al. 2022, eq. 8 and Fig. 4), so clockwise is dissipation.
     """
     times, force = run.element_force(span)
     at = np.searchsorted(run.ticks_s, times)
@@ -46,7 +46,7 @@ def momentum_loop(run: RunData, span: ElementSpan) -> tuple[Floats, Floats, Floa
 
 
 def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
-    """Draws force against penetration, pressing and releasing told apart, beside the wall it should be."""
+    """Draws force against penetration, with pressing and releasing told apart, beside that of the ideal wall."""
     title = "Force against penetration"
     if not run.history.walls:
         _say(ax, title, "No wall in this scene, so there is no\nforce against penetration to show.")
@@ -61,14 +61,14 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
     ax.plot(early_depth * MM, early_force, **early)
     pressing = np.diff(depth, append=depth[-1:]) > 0
     for part, colour, label in ((pressing, style.PRESSING, "pressing"), (~pressing, style.RELEASING, "releasing")):
-        # Each stretch goes on to the point after it.
+        # Each stretch continues to the point after it.
         drawn = part | np.concatenate([[False], part[:-1]]) if len(part) else part
         x, y = np.where(drawn, depth * MM, np.nan), np.where(drawn, force, np.nan)
         ax.plot(x, y, color=colour, linewidth=1.1, label=label, gid=label)
     in_contact = np.concatenate([d[(f != 0.0) | (d > 0.0)] for d, f in ((early_depth, early_force), (depth, force))])
     in_contact = in_contact[np.isfinite(in_contact)]
     deepest = in_contact.max(initial=0.0)
-    with suppress(UnknownKind):  # of a package or file that is not here
+    with suppress(UnknownKind):  # for a kind from a package or file that is not here
         wall = make_wall(run.wall_table_at(span_s[1]))
         label, points = ("ideal spring", 2) if wall.kind == "spring" else ("ideal wall, at rest", _CURVE)
         line = np.linspace(0.0, deepest, points)
@@ -81,7 +81,7 @@ def draw_force_position(ax: Axes, run: RunData, span_s: tuple[float, float]) -> 
 
 
 def _say(ax: Axes, title: str, text: str) -> None:
-    """Says in place of a loop why there is none."""
+    """Writes in place of a loop why there is none."""
     style.dress(ax, title, "", "")
     ax.set_axis_off()
     look: dict[str, Any] = {"fontsize": style.SMALL + 1, "color": style.GREY, "transform": ax.transAxes}
@@ -89,7 +89,7 @@ def _say(ax: Axes, title: str, text: str) -> None:
 
 
 def draw_momentum(ax: Axes, run: RunData, span_s: tuple[float, float]) -> None:
-    """Draws momentum against velocity of the virtual inertias at work in a stretch of time, or the motion."""
+    """Draws momentum against velocity of the virtual inertias at work in a stretch of time; without any, the motion."""
     loops = [
         (number, span, within(span_s, *momentum_loop(run, span)))
         for number, span in enumerate(run.history.elements)

@@ -1,4 +1,4 @@
-"""The figure of several runs over one another: position, force and energy, with what their scenes differ in."""
+"""The figure of several runs over one another: position, force and energy, with the differences of their scenes."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 MOST_RUNS = 6
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#332288")
-# Of equal lines the one below is seen beside the one above.
+# Where lines are equal, the one below is seen beside the one above.
 _WIDTHS = (2.8, 2.1, 1.6, 1.2, 0.9, 0.6)
-# A longer name of a file is cut.
+# Longer names of files are cut.
 _LONGEST_NAME = 150
-# Of the notes below the figure.
+# Letters in, and height of, a line of the notes below the figure.
 _LINE_LETTERS, _LINE_INCHES = 195, 0.2
 
 
@@ -37,7 +37,7 @@ def draw_overlay(directories: Sequence[Path], target: Path | None = None) -> Pat
     """Draws several runs over one another into a file, and returns that.
 
     Args:
-        directories: of runs, two to ``MOST_RUNS``; of one that was killed, what its log holds is drawn.
+        directories: of runs, two to ``MOST_RUNS``; for a run that was killed, what its log holds is drawn.
         target: file of the figure; in the first directory when None, named after the others.
 
     Raises:
@@ -84,9 +84,9 @@ def make_overlay(runs: Sequence[RunData], names: Sequence[str]) -> Figure:
 
 
 def _notes_below(runs: Sequence[RunData], names: Sequence[str]) -> list[tuple[str, list[str]]]:
-    """Returns the lines on why runs failed and what may not be meant in their scenes, with the colours of the runs.
+    """Returns the lines on why runs failed and what may be unintended in their scenes, with the colours of the runs.
 
-    What is said of several is said once.
+    What applies to several runs is said once.
     """
     told: dict[str, list[int]] = {}
     for place, run in enumerate(runs):
@@ -101,7 +101,7 @@ def _notes_below(runs: Sequence[RunData], names: Sequence[str]) -> list[tuple[st
 
 
 def _note(footer: Figure | SubFigure, words: str, colours: Sequence[str], y: float) -> None:
-    """Writes a line below the panels, with a stroke in the colour of each run that it speaks of."""
+    """Writes a line below the panels, with a stroke in the colour of each run that it is about."""
     from matplotlib.lines import Line2D
 
     width = 0.02 / max(1, len(colours))
@@ -156,7 +156,7 @@ def _forces(ax: Axes, runs: Sequence[RunData], span_s: tuple[float, float], titl
 
 
 def _energies(ax: Axes, runs: Sequence[RunData], span_s: tuple[float, float]) -> None:
-    """Draws the true books of wall and elements together, which is what the controller has taken out."""
+    """Draws the sum of the true books of wall and elements, which is the energy that the controller has taken out."""
     taken: list[Book | None] = [next(iter(run.books()[-1:]), None) for run in runs]
     ends = [np.abs(book.true_J[np.isfinite(book.true_J)]).max(initial=0.0) for book in taken if book]
     factor, letter = prefix_for(ends)

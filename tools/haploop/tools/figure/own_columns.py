@@ -1,4 +1,4 @@
-"""The row of panels with what elements show of themselves: a panel for each unit."""
+"""The row of panels with the columns that elements show of their own: a panel for each unit."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 _MOST_PANELS, _MOST_NAMED = 3, 2
 _PREFIXED = {"J", "m", "m/s", "N", "s", "W"}
-# Of several columns of one element, which have its colour, in one panel.
+# For several columns of one element in one panel, which all have its colour.
 _DASHES = ("-", (0, (4, 2)), (0, (1, 1.5)), (0, (6, 2, 1, 2)))
 _NAME = re.compile(r"dissipation\.(\d+)\.(\w+)")
 
 
 def own_columns(run: RunData) -> dict[str, dict[str, Floats]]:
-    """Returns by unit what elements show in the log beside their forces, by name, at every tick."""
+    """Returns the columns that elements log beside their forces, by unit and then by name, at every tick."""
     units = getattr(run.controller, "units", {})
     found: dict[str, dict[str, Floats]] = {}
     for name, column in run.controller.items():
@@ -44,9 +44,9 @@ class _Shown(NamedTuple):
 
 
 def draw_own_columns(body: SubFigure, grid: GridSpec, row: int, run: RunData) -> None:
-    """Draws them over the whole run into a row of a grid of three columns; the first units, where there are more.
+    """Draws the elements' own columns over the whole run into a row of three panels; the first units if there are more.
 
-    An element has its colour and its name as in the other panels.
+    An element has the same colour and name as in the other panels.
     """
     for place, (unit, columns) in enumerate(list(own_columns(run).items())[:_MOST_PANELS]):
         ax = body.add_subplot(grid[row, place])
@@ -60,7 +60,7 @@ def draw_own_columns(body: SubFigure, grid: GridSpec, row: int, run: RunData) ->
             look = {"linestyle": _DASHES[names.index(part.column) % len(_DASHES)]}
             line(ax, part.t_s, part.values / factor, label, style.element_colour(part.element), held=True, **look)
         ax.set_xlim(*run.span_s)
-        # One alone is named at its axis, too.
+        # A single column is named at its axis, too.
         own_name = names[0] if len(names) == 1 else ""
         label = f"{own_name} ({letter}{unit})".lstrip() if unit else own_name
         title = f"Own columns: {', '.join(names)}" if len(names) <= _MOST_NAMED else f"Own columns in {unit}"
@@ -70,7 +70,7 @@ def draw_own_columns(body: SubFigure, grid: GridSpec, row: int, run: RunData) ->
 
 
 def _by_element(run: RunData, name: str, column: Floats) -> list[_Shown]:
-    """Returns a column of the log, such as ``dissipation.0.alpha``, by the elements that wrote it."""
+    """Returns a column of the log, such as ``dissipation.0.alpha``, divided among the elements that wrote it."""
     slot, own_name = _NAME.fullmatch(name).groups()  # pyright: ignore[reportOptionalMemberAccess]
     ticks = np.rint(run.ticks_s * run.control_rate)
     parts = []

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-# What has room in the table and below the figure; longer names of books are smaller.
+# What has room in the table and below the figure; names of books that are longer are set smaller.
 _MOST_BOOKS, _NAME_LETTERS, _MOST_LINES, _LINE_LETTERS = 7, 56, 2, 225
 
 # Badge of a run that failed, and how its summary says so.
@@ -34,7 +34,7 @@ _LINES = {"friction_heat_J": "friction", "actuator_J": "actuator"}
 
 
 def draw(directory: Path, target: Path | None = None) -> Path:
-    """Draws the figure of a run, or of the log of one that was killed, into a file, and returns that.
+    """Draws the figure of a run, or of the log of one that was killed, into a file, and returns its path.
 
     Args:
         directory: what ``haploop run`` made.
@@ -101,7 +101,7 @@ def _draw_header(figure: Figure | SubFigure, run: RunData) -> None:
 
 
 def badge(run: RunData) -> str:
-    """Returns the verdict, that a run failed, or that it has none."""
+    """Returns the verdict of a run, or that it failed, or that it has no verdict."""
     return _FAILED if failure(run) else told(run.summary) if run.summary else "no verdict"
 
 
@@ -118,7 +118,7 @@ def key_numbers(run: RunData) -> list[str]:
     if not run.summary["ticks"]:
         return [f"nothing came of the plant: {last - first:g} s as the controller measured and commanded it"]
     window, energy = run.summary["window"], run.summary["energy"]
-    # Of a run that failed the log may hold more than the window saw.
+    # The log of a run that failed may hold more than the window saw.
     from_s, to_s = window["from_s"], run.summary["duration_s"]
     is_end = last - to_s < 1.5 / run.control_rate
     when = f"in the last {last - from_s:.3g} s" if is_end else f"from {from_s:.3g} to {to_s:.3g} s"
@@ -168,7 +168,7 @@ class Row(NamedTuple):
 
 
 def book_rows(run: RunData, books: list[Book]) -> list[Row]:
-    """Returns wall, its leak by cause, elements, then the books of the plant and the counts."""
+    """Returns the rows of the wall, its leak by cause and the elements, then the books of the plant and the counts."""
     spans = {span.name: span for span in run.history.elements}
     energy = run.summary.get("energy", {}) if run.energy else {}
     rows = []

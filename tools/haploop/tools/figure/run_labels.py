@@ -1,4 +1,4 @@
-"""Labels of runs in one figure: name, title where not all have the same, and what the scene differs in."""
+"""Labels of runs in one figure: name, title where the titles differ, and the differences of the scenes."""
 
 from __future__ import annotations
 
@@ -30,21 +30,21 @@ def labels(runs: Sequence[RunData], names: Sequence[str]) -> list[str]:
 
 
 def _differs(run: RunData, place: int, runs: Sequence[RunData], unlike: Mapping[str, Sequence[Any]]) -> str:
-    """Returns what of a run's scene is not the same in all: elements and events in words, then keys."""
+    """Returns what in a run's scene is not the same in all: elements and events in words, then keys."""
     elements, of_elements = _elements(run, place, runs)
     events, of_events = _events(run, place, runs)
     words, told = elements + events, (*of_elements, *of_events)
     for key, values in unlike.items():
         if values[place] is not None and not key.startswith(told):
             words.append(f"{key} {scene_value(values[place])} {unit_at(run.scene, key, run.units)}".rstrip())
-    # Where it has none of the keys, those of the others.
+    # A run that has none of the keys is described by those of the others.
     words = words or [f"no {key}" for key in unlike]
     more = f" and {len(words) - _MOST_DIFFERENCES} more" if len(words) > _MOST_DIFFERENCES else ""
     return ", ".join(words[:_MOST_DIFFERENCES]) + more
 
 
 def _elements(run: RunData, place: int, runs: Sequence[RunData]) -> tuple[list[str], list[str]]:
-    """Returns the elements of a run that others have not, or that it lacks, and the beginnings of their keys."""
+    """Returns the elements that a run has and others do not, or lacks, and the beginnings of their keys."""
     words, told = [], []
     for slot in range(max(len(one.scene.dissipation) for one in runs)):
         there = [one.scene.dissipation[slot] if slot < len(one.scene.dissipation) else None for one in runs]
@@ -59,7 +59,7 @@ def _elements(run: RunData, place: int, runs: Sequence[RunData]) -> tuple[list[s
 
 
 def _events(run: RunData, place: int, runs: Sequence[RunData]) -> tuple[list[str], list[str]]:
-    """Returns the events of a run that some others have not, or that it lacks, and the beginnings of their keys."""
+    """Returns the events that a run has and some others do not, or lacks, and the beginnings of their keys."""
     words, told = [], []
     for slot in range(max(len(one.scene.event) for one in runs)):
         there = [one.scene.event[slot] if slot < len(one.scene.event) else None for one in runs]

@@ -1,4 +1,4 @@
-"""Names of runs that stand beside one another: those of their directories, as much of them as tells them apart."""
+"""Names of runs shown side by side: those of their directories, as much of them as tells the runs apart."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from collections.abc import Sequence
 from itertools import takewhile
 from pathlib import Path
 
-# A longer name is cut at its beginning, where others begin so, and then in its middle.
+# A longer name is cut at its beginning, where others begin the same, and then in its middle.
 _LONG, _CUT = 36, "…"
 _SEPARATORS = "_-/ ."
 
 
 def run_names(directories: Sequence[Path]) -> list[str]:
-    """Returns a name for each directory, no two the same: its own, with so many of those above as it takes.
+    """Returns a name for each directory, no two the same: its own, with as many directories above it as necessary.
 
-    A directory that is given again has its number behind its name.
+    A directory that is given again has a number after its name.
     """
     whole = [Path(os.path.abspath(directory)) for directory in directories]  # noqa: PTH100, a link has its own name
     unlike = [*dict.fromkeys(whole)]
@@ -32,7 +32,10 @@ def run_names(directories: Sequence[Path]) -> list[str]:
 
 
 def shortened(names: Sequence[str]) -> list[str]:
-    """Returns long names without the words that all of these begin with; whole where that leaves two the same."""
+    """Returns names with the long ones cut: without the words that all of these begin with, and then in their middle.
+
+    Returns all of them whole if two would become the same.
+    """
     long = [name for name in names if len(name) > _LONG]
     alike = takewhile(lambda letters: len({*letters}) == 1, zip(*long, strict=False)) if len(long) > 1 else ()
     common = "".join(letters[0] for letters in alike)

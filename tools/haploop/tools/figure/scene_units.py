@@ -26,7 +26,7 @@ def element_units() -> dict[str, str]:
 
 
 def declared_units(source: str) -> dict[str, str]:
-    """Returns the units that the text of a plugin file declares, as ``element_units``; it is read, never run."""
+    """Returns the units that the text of a plugin file declares, as ``element_units`` does; it is parsed, never run."""
     units: dict[str, str] = {}
     with suppress(SyntaxError, ValueError, RecursionError, MemoryError):
         for made in [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef)]:

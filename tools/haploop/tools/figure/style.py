@@ -32,7 +32,7 @@ VERDICTS = {
     "no-contact": "#555555",
     "undecided": "#555555",
 }
-# Of what is steady with a proviso.
+# Colour of a run that is steady with a proviso.
 _PROVISO = "#5C6600"
 TEXT, SMALL, LARGE = 9.0, 8.0, 15.0
 # Letters of a legend that fit above a panel, and what the handle of an entry and a letter of the title take of them.
@@ -40,7 +40,7 @@ _ROOM_LETTERS, _HANDLE_LETTERS, _TITLE_LETTER = 88, 6, 1.25
 
 
 def verdict_colour(summary: Summary | None) -> str:
-    """Returns the colour of a run's verdict; what is steady with a proviso is not as green as what is so without."""
+    """Returns the colour of a run's verdict; steady with a proviso is less green than steady without one."""
     if not summary:
         return GREY
     has_proviso = summary["verdict"] == "steady" and summary.get("stability", {}).get("provisos")
@@ -72,7 +72,7 @@ def few_ticks(ax: Axes) -> None:
 
 
 def plain_numbers(axis: Axis, at: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
-    """Puts numbers at these in every decade and without powers of ten on a logarithmic axis."""
+    """Labels a logarithmic axis at these multiples in every decade, with numbers without powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axis.set_major_locator(LogLocator(subs=at))
@@ -82,7 +82,7 @@ def plain_numbers(axis: Axis, at: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
 
 
 def legend(ax: Axes, only: tuple[str, ...] = (), spare: tuple[str, ...] = (), **where: Any) -> None:
-    """Draws a small legend above the axes' right end, where no line can run through it, or where told to.
+    """Draws a small legend above the axes' right end, where no line can run through it, or at ``where``.
 
     Entries that do not fit beside the title are left out, ``spare`` ones first, in their order; the colours are
     explained beside the books, too.
@@ -101,7 +101,7 @@ def legend(ax: Axes, only: tuple[str, ...] = (), spare: tuple[str, ...] = (), **
 
 
 def _share_of_widest(ax: Axes) -> float:
-    """Returns the width of the column of axes in its grid, as a share of the widest column's."""
+    """Returns the width of the axes' column in its grid, as a share of the widest column's."""
     if not (spec := ax.get_subplotspec()):
         return 1.0
     widths = [float(width) for width in spec.get_gridspec().get_width_ratios()]  # pyright: ignore[reportGeneralTypeIssues]
@@ -118,7 +118,7 @@ _DPI = 110
 
 
 def empty_figure(width_in: float, height_in: float) -> Figure:
-    """Returns a white figure of a size in inches that makes room for what it holds; FigureError without matplotlib."""
+    """Returns a white figure of a size in inches that makes room for its contents; FigureError without matplotlib."""
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
@@ -129,7 +129,7 @@ def empty_figure(width_in: float, height_in: float) -> Figure:
 def write_figure(figure: Figure, target: Path) -> Path:
     """Writes a figure in the format of the file's suffix, ``.png`` where it has none; returns the file.
 
-    Raises FigureError where it cannot be written; a figure that was there then stays.
+    Raises FigureError where it cannot be written; a figure that was there before is then kept.
     """
     if not target.suffix and not target.is_dir():
         target = target.with_name(f"{target.name}.png")
@@ -144,7 +144,7 @@ def write_figure(figure: Figure, target: Path) -> Path:
             with contextlib.suppress(OSError):
                 part.unlink()
             raise
-    except ValueError as error:  # which names the formats there are
+    except ValueError as error:  # it names the available formats
         raise FigureError(f"The figure {target} cannot be written: {error}.") from error
     except OSError as error:
         raise FigureError(f"The figure {target} cannot be written: {error.strerror}.") from error
@@ -152,7 +152,7 @@ def write_figure(figure: Figure, target: Path) -> Path:
 
 
 def _take_as_written(figure: Figure) -> None:
-    """Has names and titles of the user's drawn as they are written: their dollars enclose no formula."""
+    """Has the user's names and titles drawn as they are written: their dollar signs enclose no formula."""
     from matplotlib.text import Text
 
     for text in figure.findobj(Text):
@@ -161,21 +161,21 @@ def _take_as_written(figure: Figure) -> None:
 
 
 def fix_layout(figure: Figure) -> None:
-    """Gives everything its place and keeps it there, so that labels can be placed among what is drawn."""
+    """Lays out everything and fixes the layout, so that labels can be placed among what is drawn."""
     _take_as_written(figure)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
 
 
 def fit_text(text: Text, room_px: float, smallest: float = 0.78) -> None:
-    """Makes a text no wider than some pixels: smaller, down to a share of its size, then cut off.
+    """Makes a text no wider than a number of pixels: smaller, down to a share of its size, then cut off.
 
-    A dollar in it encloses no formula.
+    Dollar signs in it do not enclose a formula.
     """
     text.set_parse_math(False)
     width, size = text.get_window_extent().width, float(text.get_fontsize())
     if width > room_px:
-        # A little smaller than in proportion, since letters are as wide as whole pixels.
+        # A little smaller than in proportion, since the widths of letters are whole pixels.
         text.set_fontsize(size * max(smallest, min(1.0, 0.98 * room_px / width)))
     content = text.get_text()
     while content and (width := text.get_window_extent().width) > room_px:

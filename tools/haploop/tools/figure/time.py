@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MM = 1e3
-# The approach is left out of the view when it is this many times as long as the way in contact.
+# The approach is left out of the view when the whole motion is this many times as wide as that since contact.
 _DWARFED = 3.0
 # Events closer together than this share of the axis have one label.
 _NEAR = 0.025
@@ -44,11 +44,11 @@ def position_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: s
 
 
 def _view_mm(run: RunData, t: Floats, x_mm: Floats) -> tuple[float, float, str]:
-    """Returns the limits of the position axis, and a note in brackets on what lies outside of them.
+    """Returns the limits of the position axis, and a note in brackets on what lies outside them.
 
     ``t`` are times in s, ``x_mm`` the positions of all bodies then, shape (bodies, times).
     """
-    if not np.isfinite(x_mm).any():  # the log of a run that was killed may end before
+    if not np.isfinite(x_mm).any():  # the log of a run that was killed may end before any of it
         return -0.01, 0.01, ""
     x_mm = np.where(np.isfinite(x_mm), x_mm, np.nan)
     low, high, note = np.nanmin(x_mm), np.nanmax(x_mm), ""
@@ -93,7 +93,7 @@ def force_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str)
             line(ax, times[here], force[here], span.name, colour, held=True, linewidth=1.0, gid=span.name)
     at_steps = (run.t_s >= span_s[0]) & (run.t_s <= span_s[1])
     for name, force in run.plant_forces_N.items():
-        # Below the parts that it may equal, and wide enough to be seen beside them.
+        # Drawn below the parts that it may equal, and wide enough to be seen beside them.
         look = {"linewidth": 2.8, "alpha": 0.5, "zorder": 1.9, "gid": name}
         line(ax, run.t_s[at_steps], force[at_steps], name, style.OF_THE_PLANT[name], **look)
     most = run.scene.actuator and run.scene.actuator.saturation
@@ -106,7 +106,7 @@ def force_panel(ax: Axes, run: RunData, span_s: tuple[float, float], title: str)
 
 
 def energy_panel(ax: Axes, run: RunData, books: list[Book], colours: dict[str, str]) -> None:
-    """Draws the energy taken out of the device: true books drawn through, sampled ones dashed."""
+    """Draws the energy taken out of the device: true books as solid lines, sampled ones dashed."""
     energies = np.concatenate([np.empty(0), *(curve for book in books for curve in (book.true_J, book.sampled_J))])
     factor, letter = prefix_for(np.abs(energies[np.isfinite(energies)]).max(initial=0.0, keepdims=True))
     style.dress(ax, "Energy out of the device (below 0: into it)", "time (s)", f"energy ({letter}J)")
@@ -143,9 +143,9 @@ def mark_events(axes: list[Axes], run: RunData) -> None:
 
 
 def extremes(y: np.ndarray, buckets: int = 1500) -> np.ndarray:
-    """Finds the samples with which a line looks like the whole series: of each bucket the smallest and the largest.
+    """Finds the samples with which a line looks like the whole series: the smallest and the largest of each bucket.
 
-    Buckets are stretches of equal length; samples that are no finite number are passed over where others are at hand.
+    Buckets are stretches of equal length; samples that are not finite are skipped where a bucket has others.
 
     Returns:
         Indices in rising order, at most ``2 * buckets + 2``, with the first and the last; all of a short series.

@@ -2,7 +2,8 @@
 
 Every row (all values but that on the axis) is first run at the same coarse points. The first two neighbours of which
 one holds and the other does not enclose its boundary, which is then bisected; a round runs one value of every row, so
-that arrays stay full. A row may change more than once; the changes at the coarse points are counted, the first counts.
+that arrays stay full. A row may change more than once: the changes at the coarse points are counted, and the first one
+is the boundary.
 """
 
 from __future__ import annotations
@@ -27,9 +28,10 @@ class Boundary:
     """The boundary of one row.
 
     Attributes:
-        near, far: it holds at near and at every coarse point before, and not at far; NaN where there is no boundary.
+        near, far: the row holds at near and at every coarse point before, and not at far; NaN where there is no
+            boundary.
         changes: how often neighbouring coarse points differ.
-        why: why there is no boundary, or why it is no narrower; else empty.
+        why: why there is no boundary, or why its bracket is no narrower; else empty.
     """
 
     near: float
@@ -55,10 +57,10 @@ def find_boundaries(
         points: values on the axis, run for every row; the search goes from the first to the last.
         run: runs candidates and yields the index of each with its row of the table, in any order; one that it does
             not yield leaves its boundary unknown.
-        holds: whether that is on the near side; None where it tells nothing, as when the run failed.
+        holds: whether a row of the table is on the near side; None where it shows nothing, as when the run failed.
 
     Raises:
-        ValueError: there are fewer than two points, or they do not go one way.
+        ValueError: there are fewer than two points, or they neither only rise nor only fall.
     """
     if {(b > a) - (b < a) for a, b in pairwise(points)} not in ({1}, {-1}):
         raise ValueError("A boundary is sought between at least two points that increase, or that decrease.")
@@ -115,9 +117,9 @@ def _beyond_undecided(
     answers: Callable[[Sequence[Candidate]], object],
     tolerance: Tolerance,
 ) -> dict[int, Bracket]:
-    """Returns, of each row whose far side is undecided, where that ends: its last value known, and the next one.
+    """Returns, for each row whose far side is undecided, where that ends: the last undecided value, and the next one.
 
-    What no search has decided up to the last point stays undecided to there.
+    What the search has not decided up to the last point stays undecided up to there.
     """
     ahead = 1.0 if points[-1] > points[0] else -1.0
     ends: dict[int, Bracket] = {}
@@ -136,8 +138,8 @@ def _beyond_undecided(
 
 
 def verdict_is(word: str = "steady") -> Holds:
-    """Makes the test of a row for this verdict; it gives None for a run that failed.
+    """Makes the test of a row for this verdict; it returns None for a run that failed.
 
-    One that is undecided does not hold, so that nothing is called steady that may not be.
+    A row that is undecided does not hold, so that nothing is called steady that may not be.
     """
     return lambda row: row["verdict"] == word if row.get("verdict") else None

@@ -20,7 +20,7 @@ from haploop.protocol.scene.table import Table, Tables, as_plain
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-# By dotted key of a scene, what may stand there: numbers in SI units, names, tables.
+# By dotted key of a scene, the values that it may have: numbers in SI units, names, tables.
 Values = Mapping[str, Any]
 # Without these tables there is no scene.
 _NEEDED = {"title", "duration", "device"}
@@ -35,13 +35,13 @@ class Refused(SceneError):
 
 @dataclass(frozen=True)
 class Base:
-    """A resolved scene that cells vary; tables that a cell leaves alone are shared with it."""
+    """A resolved scene that cells vary; tables that a cell does not change are shared with it."""
 
     scene: Scene
 
     @cached_property
     def tables(self) -> Tables:
-        """The scene as its file would have it; not to be changed."""
+        """The scene as its file would hold it; not to be changed."""
         return self.scene.as_dict()
 
     @cached_property
@@ -49,9 +49,9 @@ class Base:
         return {name: made for name, made in lines(self.tables).items() if name not in self.scene.others}
 
     def has_number(self, key: str) -> bool:
-        """Tells whether a number stands at a dotted key, which has no rules but its bounds and those between keys.
+        """Tells whether a dotted key holds a number that has no rules except its bounds and those between keys.
 
-        The numbers of a list have: the times of a recorded force rise.
+        The numbers of a list have further rules: the times of a recorded force rise.
         """
         around, _, _ = key.rpartition(".")
         inside = value_at(self.scene, around) if around else self.scene
@@ -59,15 +59,15 @@ class Base:
         return plain and isinstance(value_at(self.scene, key), int | float)
 
     def with_numbers(self, numbers: Values, kinds: Mapping[str, type[Element]]) -> Scene:
-        """Returns the scene with other numbers, each in order by itself, where there are some already.
+        """Returns the scene with other numbers, each valid alone, in place of numbers that it already has.
 
-        Raises SceneError, with no file named, where they do not go together.
+        Raises SceneError, with no file named, where they are not valid together.
         """
         scene = with_values(self.scene, numbers)
         return _with_rules(Layers(Path(), self.as_dict(scene)), scene, kinds)
 
     def with_values(self, values: Values, kinds: Mapping[str, type[Element]]) -> Scene:
-        """Returns the scene with other values of any kind; SceneError, with no file named, where there is none."""
+        """Returns the scene with other values of any kind; SceneError, with no file named, where they make no scene."""
         changed = _first_parts(values)
         if not changed <= vars(self.scene).keys():
             return resolved(values, self.tables, kinds)
@@ -78,7 +78,7 @@ class Base:
         return _with_rules(layers, scene, kinds)
 
     def as_dict(self, cell: Scene) -> Tables:
-        """Returns a cell's scene as nested dicts; those of tables that it shares are not to be changed."""
+        """Returns a cell's scene as nested dicts; those of shared tables are not to be changed."""
         own = vars(self.scene)
         given = {name: value for name, value in vars(cell).items() if value is not None and value != ()}
         others = given.pop("others")
@@ -94,7 +94,7 @@ class Base:
 
 
 def resolved(values: Values, base: Tables, kinds: Mapping[str, type[Element]]) -> Scene:
-    """Resolves a scene with other values at some dotted keys; SceneError, with no file named, where there is none."""
+    """Resolves a scene with other values at some dotted keys; SceneError, with no file named, if they make none."""
     layers = _laid(values, base)
     return _with_rules(layers, validated(layers, layers.data, kinds), kinds)
 
@@ -104,7 +104,7 @@ def _first_parts(values: Values) -> set[str]:
 
 
 def _laid(values: Values, base: Tables) -> Layers:
-    """Lays values over the tables of a scene; tables that they leave alone are shared."""
+    """Lays values over the tables of a scene; tables that they do not change are shared."""
     changed = _first_parts(values)
     layers = Layers(Path(), {name: deepcopy(table) if name in changed else table for name, table in base.items()})
     for key, value in values.items():

@@ -1,4 +1,4 @@
-"""A resolved sweep and its cells: one run each, numbered, made when they are needed."""
+"""A resolved sweep and its cells: one run each, numbered, and made when needed."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Axis:
     """An axis of a sweep: a dotted key of the scene and its values.
 
     Attributes:
-        values: numbers in an SI unit; or, unit None, names, tables, whatever a scene may hold there.
+        values: numbers in an SI unit; if the unit is None, names, tables, or whatever a scene may hold there.
     """
 
     key: str
@@ -44,7 +44,7 @@ class Axis:
 
     @property
     def apart(self) -> bool:
-        """Tells whether scenes of two values are of two structures, which are run in different arrays."""
+        """Tells whether the scenes of two values have different structures, which are run in different arrays."""
         return self.unit is None or (self.whole and self.key != "seed") or key_path(self.key)[0] in _APART
 
     def entry(self, value: Any) -> Any:
@@ -63,7 +63,7 @@ class Bisect:
 
 @dataclass(frozen=True)
 class Extra:
-    """A cell between the values of the axis that is bisected: its number, a cell beside it, its own value there."""
+    """A cell between the values of the bisected axis: its number, a cell beside it, and its own value on that axis."""
 
     cell: int
     beside: int
@@ -75,12 +75,12 @@ Item = int | Extra
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep, resolved. Its cells are numbered with the axes that keep scenes apart outermost and seeds innermost.
+    """A resolved sweep. Its cells are numbered with the axes that keep scenes apart outermost and seeds innermost.
 
     Attributes:
         base: the resolved scene that the axes vary, one to three in the order of the file.
         repeat: seeds of every combination: that of the scene, and those after it.
-        record: columns of what is recorded, by dotted keys of a summary.
+        record: the columns that are recorded, by dotted keys of a summary.
     """
 
     title: str
@@ -93,7 +93,7 @@ class Sweep:
 
     @cached_property
     def order(self) -> tuple[Axis, ...]:
-        """From the outermost to the innermost."""
+        """The axes from the outermost to the innermost."""
         return tuple(sorted(self.axes, key=lambda axis: not axis.apart))
 
     @property
@@ -105,14 +105,14 @@ class Sweep:
         return math.prod(self._shape)
 
     def groups(self) -> Iterator[Group]:
-        """Yields the cells whose scenes go into one array, if they go into any."""
+        """Yields groups of cells whose scenes go into one array, if they go into any."""
         length = self.count // math.prod(len(axis.values) for axis in self.axes if axis.apart)
         for first in range(0, self.count, length):
             yield Group(range(first, first + length), self.together(first))
 
     def together(self, item: Item) -> bool:
-        """Tells whether the scene of a cell, and those like it, go into an array."""
-        with suppress(Exception):  # it will be a row with its reason
+        """Tells whether the scene of a cell, and scenes like it, go into an array."""
+        with suppress(Exception):  # the cell will be a row that says why
             return is_batchable(self.scene(item))
         return False
 
@@ -130,7 +130,7 @@ class Sweep:
         return {axis.key: found[axis.key] for axis in self.axes}, self.base.seed + int(repeat)
 
     def scene(self, item: Item) -> Scene:
-        """Returns the resolved scene of a cell; tables that its values leave alone are those of the base.
+        """Returns the resolved scene of a cell; tables that its values do not change are those of the base.
 
         Raises:
             ValueError: its values make no scene that can be run; the message says why.
@@ -145,7 +145,7 @@ class Sweep:
 
     @cached_property
     def _in_numbers(self) -> bool:
-        """Tells whether cells differ from the base in numbers alone, each known to be in order by itself."""
+        """Tells whether cells differ from the base only in numbers, each of which is known to be valid alone."""
         seeds = number_of(Scene, SEED).quantity.complaint(self.base.seed + self.repeat - 1) is None
         return seeds and all(axis.unit is not None and self._base.has_number(axis.key) for axis in self.axes)
 
@@ -167,7 +167,7 @@ class Sweep:
         return Base(self.base)
 
     def bisected(self, bisect: Bisect) -> tuple[Axis, list[Axis]]:
-        """Returns the axis of a search, and the other axes."""
+        """Returns the axis of a search and the other axes."""
         others = [axis for axis in self.axes if axis.key != bisect.axis]
         return next(axis for axis in self.axes if axis not in others), others
 
@@ -176,7 +176,7 @@ class Sweep:
         return [Column(CELL, WHOLE), *self.key_columns(self.axes), *self.record, *texts]
 
     def key_columns(self, axes: Sequence[Axis]) -> list[Column]:
-        """Returns a column for each of some axes, and one for the seed where that is no axis."""
+        """Returns a column for each of some axes, and one for the seed where it is not an axis."""
         columns = {axis.key: Column(axis.key, TEXT if axis.unit is None else NUMBER, axis.unit or "") for axis in axes}
         return list((columns | {SEED: Column(SEED, WHOLE)}).values())
 

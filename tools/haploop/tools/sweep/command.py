@@ -1,4 +1,4 @@
-"""``haploop sweep``: a sweep file from reading to table; a sweep that was stopped goes on where it was."""
+"""``haploop sweep``: from a sweep file to its table; a sweep that was stopped continues where it was."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from haploop.tools.sweep.cells import Sweep
 
 SUMMARY = "summary.json"
-# What is told of a sweep whose every cell is there.
+# Keys of the summary that are reported for a sweep whose cells are all there.
 _NEEDED = {"title", "cells", "counts", "ended", "first_reason", "rate_1_s"}
 
 
@@ -54,7 +54,7 @@ class Request:
 
 
 def sweep(request: Request, as_json: bool) -> None:
-    """Runs what is missing of a sweep and prints its summary."""
+    """Runs the missing cells of a sweep and prints its summary."""
     if request.workers is not None and request.workers < 1:
         leave(f"--workers must be at least 1, but {request.workers} was given.", WRONG_USE)
     with plain_errors():
@@ -79,12 +79,12 @@ def sweep(request: Request, as_json: bool) -> None:
 
 
 def carry_out(request: Request) -> tuple[Path, Summary]:
-    """Runs what is missing of a sweep; returns its directory and summary.
+    """Runs the missing cells of a sweep; returns its directory and summary.
 
     Raises:
         SceneError, PluginError: the sweep cannot be run.
         NeedsPyarrow, ExecutorError: something it needs is not installed or cannot be reached.
-        OutputError, StoreError, LogError: the directory, or what is in it, cannot be used.
+        OutputError, StoreError, LogError: the directory, or a file in it, cannot be used.
     """
     pyarrow()
     made = load(request.path, request.overrides, read_sources(request.plugins))
@@ -148,10 +148,10 @@ def _run(request: Request, made: Sweep, directory: Path) -> Summary:
 
 
 def _directory(request: Request, made: Sweep) -> Path:
-    """Returns a new directory, or that of this very sweep, which then goes on; OutputError for any other."""
+    """Returns a new directory, or that of the same sweep, which then continues; OutputError for any other."""
     out, text = request.out, made.toml()
     there = (out / SWEEP).read_text(encoding="utf-8") if out is not None and (out / SWEEP).is_file() else ""
-    if out is not None and there:  # empty as long as another is just about to begin there
+    if out is not None and there:  # empty while another sweep is just about to begin there
         if there != text:
             changed = _first_difference(there, text)
             raise OutputError(f"{out} holds another sweep ({changed}); name another directory with --out.")
@@ -195,7 +195,7 @@ def _summary_sentences(summary: Summary) -> str:
 
 
 def _demand_compiler(made: Sweep) -> None:
-    """Raises an ExecutorError before anything is started where JAX is not there, or bits are asked for."""
+    """Raises an ExecutorError before anything is started if JAX is not installed, or exact bits are asked for."""
     if wants_trajectories(made.record):
         raise ExecutorError(
             "--jax keeps to a tolerance, so that trajectory_sha256 means nothing; leave it out of record."

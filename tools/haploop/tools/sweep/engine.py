@@ -1,4 +1,4 @@
-"""Runs a sweep and shows its progress: every cell not stored yet, then the boundaries, then one table of all."""
+"""Runs a sweep and shows its progress: every cell not stored yet, then the boundaries, then one table of all rows."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ _REFRESH_PER_S = 4
 
 
 class Stopped(Exception):
-    """A sweep was asked to stop; what is done is stored."""
+    """A sweep was asked to stop; the cells that are done are stored."""
 
 
 class SweepProgress:
-    """Cells done, cells per second, time left and what came of them, on a terminal; a context manager.
+    """Cells done, cells per second, time left and results so far, on a terminal; a context manager.
 
     Attributes:
-        counts: of all rows, those of earlier calls too, by verdict, or by how a run ended that has none.
-        provisos: of the steady ones, what they rest on.
+        counts: number of all rows, those of earlier calls too, by verdict, or by how a run without one ended.
+        provisos: number of the steady rows by what they rest on.
     """
 
     def __init__(self, title: str, terminal: Console | None = None) -> None:
@@ -80,7 +80,7 @@ class SweepProgress:
         self._bars.stop()
 
     def expect(self, cells: int) -> None:
-        """Adds cells that are to be run."""
+        """Adds to the number of cells to be run."""
         self._total += cells
         self._bars.update(self._task, total=self._total)
 
@@ -109,7 +109,7 @@ class SweepProgress:
 
 
 def outcome(row: Row) -> str:
-    """Returns a row in one word."""
+    """Returns the outcome of a row in one word."""
     return row.get(VERDICT) or row[ENDED]
 
 
@@ -119,11 +119,11 @@ def describe_counts(counts: Mapping[str, int]) -> str:
 
 
 class Engine:
-    """One sweep on its way.
+    """One sweep that is being run.
 
     Args:
         store: where its rows go, and where those of an earlier call are.
-        stop: asked between parts; True ends the sweep after those under way.
+        stop: called between parts; True ends the sweep after those under way.
         compiled: whether to run compiled by JAX.
     """
 
@@ -147,7 +147,7 @@ class Engine:
         )
 
     def run(self) -> list[Boundary]:
-        """Runs what is missing and writes the table; returns the boundaries, where they are sought.
+        """Runs the missing cells and writes the table; returns the boundaries, if they are sought.
 
         Raises:
             Stopped: before all was done.
@@ -209,7 +209,7 @@ class Engine:
 
 
 def _without(groups: Iterable[Group], done: set[int]) -> Iterator[Group]:
-    """Yields what is left of the groups, in stretches without a gap."""
+    """Yields the cells of the groups that are not done, in stretches without a gap."""
     for group in groups:
         ends = [group.items[0] - 1, *(cell for cell in group.items if done and cell in done), group.items[-1] + 1]
         for before, after in pairwise(ends):

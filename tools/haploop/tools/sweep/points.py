@@ -1,6 +1,6 @@
-"""The values of an axis: the number that stands at its key, and a list of values, or those from one to another.
+"""The values of an axis: the number that its key holds, and a list of values or a range of them.
 
-Steps are even or in ratio.
+The steps of a range are even or in a constant ratio.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from haploop.protocol.quantity import Quantity
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-# Of one axis; more is a slip of a key.
+# Most values of one axis; more are a typing error.
 MOST_POINTS = 1_000_000
 # A last step may miss the end by this part of a step, from rounding.
 _ROUNDING = Decimal("1e-9")
@@ -33,7 +33,7 @@ class AxisError(ValueError):
     """An axis that cannot be swept; its fields are those of a ``Mistake``.
 
     Attributes:
-        place: of the mistake below the axis: a key of the span, or a place in the list; empty for the whole.
+        place: place of the mistake below the axis: a key of the span, or an index of the list; empty for the whole.
     """
 
     def __init__(
@@ -44,11 +44,11 @@ class AxisError(ValueError):
 
 
 def number_at(path: Sequence[str], scene: Layers, kinds: Mapping[str, type[Element]]) -> Number | None:
-    """Returns the reader of the number at a key; None where the key holds something else than a number.
+    """Returns the reader of the number at a key; None where the key holds something other than a number.
 
     Args:
         path: parts of the dotted key.
-        scene: says which kind each table is that has kinds.
+        scene: gives the kind of each table that has kinds.
 
     Raises:
         AxisError: no scene like this one has the key.
@@ -132,7 +132,7 @@ class Span(Model):
 def make_points(span: Span, number: Number) -> list[float]:
     """Returns the values of a span in SI units.
 
-    Raises AxisError where an end or the step is no such number, or they do not go together.
+    Raises AxisError where an end or the step is no such number, or they do not fit together.
     """
     first, last = _read(number, "from", span.start), _read(number, "to", span.to)
     if first == last:
@@ -145,7 +145,7 @@ def make_points(span: Span, number: Number) -> list[float]:
         values = [first, *inner, last]
         return list(dict.fromkeys(map(round, values))) if number.quantity.whole else values
     steps = span.count - 1 if span.count else _steps(number, first, last, span.step)
-    # In decimal, so that 0.1, 0.2, 0.3 are the numbers that a person would write.
+    # In decimal, so that the values are the numbers that a person would write: 0.1, 0.2, 0.3.
     begin, way = Decimal(repr(first)), Decimal(repr(last)) - Decimal(repr(first))
     values = (float(begin + way * k / steps) for k in range(steps + 1))
     return [_read(number, "count" if span.count else "step", value) for value in values]
@@ -154,7 +154,7 @@ def make_points(span: Span, number: Number) -> list[float]:
 def listed(values: list[Any], number: Number | None) -> list[Any]:
     """Returns the values of a list, numbers in SI units.
 
-    Raises AxisError where there are none, one is no such number, or stands there twice.
+    Raises AxisError where there are none, or one is no such number or occurs twice.
     """
     if not values:
         raise AxisError("It must have at least one value.")

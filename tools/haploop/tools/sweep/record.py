@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from haploop.tools.sweep.cells import Sweep
 
 VERDICT = "verdict"
-# Without the books, which take most of the time of a run.
+# Without the books, which take most of a run's time.
 _USUAL = (VERDICT, "window.oscillation_m", "window.displayed_stiffness_N_m", "extremes.force_max_N")
 TICKS = 2
 Complain = Callable[[int, str, str | None], None]
@@ -42,8 +42,8 @@ def make_columns(
 
     Args:
         sweep: what will be run; the first and the last of its cells that can be run are sampled.
-        complain: told the place of a key that is that of no number, word or truth value, a sentence about it, and
-            the nearest key.
+        complain: called with the place of a key that does not belong to a number, word or truth value, a sentence about
+            it, and the nearest key.
     """
     known: Summary = {}
     for cell in _samples(sweep):
@@ -71,13 +71,13 @@ def wants_trajectories(columns: Sequence[Column]) -> bool:
 
 
 def _samples(sweep: Sweep) -> list[Scene]:
-    """Returns the scenes of the corners of the grid, as they begin and as their events leave them.
+    """Returns the scenes of the first and last cell, as they begin and as their events leave them.
 
-    It is the base where none of them can be run.
+    Returns the base where neither of them can be run.
     """
     found: list[Scene] = []
     for cell in (0, sweep.count - 1):
-        with suppress(Exception):  # it will be a row with its reason
+        with suppress(Exception):  # the cell will be a row that says why
             found.append(scene := sweep.scene(cell))
             if scene.event:
                 changes = changes_of(scene_events(scene, Timebase.from_scene(scene)))
@@ -105,12 +105,12 @@ def _leaves(value: Any, key: str = "") -> Summary:
 
 
 def _without_places(name: str) -> str:
-    """Returns a key with every place in a list as 0: an element that is swapped in later makes the list longer."""
+    """Returns a key with every index of a list as 0: an element that is swapped in later makes the list longer."""
     return ".".join("0" if part.isdecimal() else part for part in name.split("."))
 
 
 def _kind(name: str, value: Any) -> str:
-    """Returns the kind of a column by a value of it; of None, which two ticks tell of a verdict, as it is declared."""
+    """Returns the kind of a column from one of its values; for None, as a verdict is after two ticks, the declared one."""
     if value is None:
         declared = Finding.__annotations__.get(name.removeprefix("stability."), "")
         return TEXT if "str" in declared else TRUTH if "bool" in declared else NUMBER

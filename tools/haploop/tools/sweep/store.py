@@ -1,4 +1,4 @@
-"""The directory of a sweep: what is finished stays finished, however the program ends."""
+"""The directory of a sweep: cells that are finished stay finished, however the program ends."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from haploop.tools.sweep.table import (
 )
 
 LOCK = ".lock"
-# The parts that a sweep writes, by their first cell; nothing else is ever removed.
+# The parts that a sweep writes, named by their first cell; nothing else is ever removed.
 _PART = f"{'[0-9]' * 12}.parquet"
-# Rows that are merged into a group of the table, which a reader can read by itself.
+# Rows that are merged into a group of the table, which a reader can read alone.
 _GROUP_ROWS = 8192
 
 
 class StoreError(Exception):
-    """Something could not be written; the message says what, why, and what is safe."""
+    """Something could not be written; the message says what, why, and what is stored safely."""
 
 
 class Store:
     """An existing directory while a sweep writes a table of a schema to it; a context manager that keeps others out.
 
-    Every part of the sweep that is done becomes a file of its own, complete or not there at all. At the end they are
-    merged into one table.
+    Every part of the sweep that is done becomes a separate file, which is either complete or absent. At the end the
+    files are merged into one table.
     """
 
     def __init__(self, directory: Path, schema: Any) -> None:
@@ -62,7 +62,7 @@ class Store:
 
     def __exit__(self, *_: object) -> None:
         with contextlib.suppress(OSError):
-            self._parts.rmdir()  # where nothing came of it
+            self._parts.rmdir()  # where no part was written
         os.close(self._lock)
 
     @property
@@ -71,7 +71,7 @@ class Store:
         return (self.directory / TABLE).exists()
 
     def done(self, columns: Sequence[str] = (CELL,)) -> list[Row]:
-        """Returns some columns of all rows that are stored; a part that cannot be read is given up, to be run again."""
+        """Returns some columns of all rows that are stored; a part that cannot be read is removed, to be run again."""
         rows = []
         for file in self._files():
             try:
@@ -87,13 +87,13 @@ class Store:
         return rows
 
     def add(self, rows: Sequence[Row]) -> None:
-        """Keeps the rows of a part that is done; raises StoreError where they cannot be written."""
+        """Stores the rows of a part that is done; raises StoreError where they cannot be written."""
         path = self._parts / f"{rows[0][CELL]:012d}.parquet"
         self._write(path, lambda file: write_table(make_table(rows, self._schema), file))
         self.rows += len(rows)
 
     def finish(self, boundaries: Any = None) -> None:
-        """Merges all parts into the table, in the order of the cells; writes the table of the boundaries, if any."""
+        """Merges all parts into the table, in the order of the cells; writes the table of boundaries, if any."""
         if boundaries is not None:
             self._write(self.directory / BOUNDARY, lambda file: write_table(boundaries, file))
         temporary = self.directory / f"{TABLE}.part"
@@ -102,13 +102,13 @@ class Store:
                 for table in self._in_order():
                     writer.write_table(table)
             temporary.replace(self.directory / TABLE)
-        with contextlib.suppress(OSError):  # the table is there; what is not a part of ours stays
+        with contextlib.suppress(OSError):  # the table is there; files that are no parts of this sweep stay
             for part in self._files():
                 part.unlink()
             self._parts.rmdir()
 
     def _in_order(self) -> Iterator[Any]:
-        """Yields all rows in groups in the order of their cells, with no more parts in memory than overlap."""
+        """Yields all rows in groups in the order of their cells; only parts that overlap are in memory at once."""
         arrow = pyarrow()
         held, last = [], -1
         for file in self._files():
@@ -146,9 +146,9 @@ class Store:
 
 
 def lock(directory: Path) -> int:
-    """Keeps other sweeps out of a directory, with an OutputError, as long as the file descriptor is open.
+    """Keeps other sweeps out of a directory, which raise OutputError, as long as the file descriptor is open.
 
-    A killed program leaves no trace.
+    A killed program leaves no lock behind.
     """
     descriptor = os.open(directory / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
     try:

@@ -1,4 +1,4 @@
-"""The sweep file, read into a resolved sweep, or into every mistake in it."""
+"""The sweep file, read into a resolved sweep, or into a list of all its mistakes."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def load(path: Path, overrides: Sequence[str] = (), sources: Sources = ()) -> Sw
 
 
 class _Reader:
-    """Collects the parts of a sweep, and all that is wrong with them."""
+    """Collects the parts of a sweep and everything that is wrong with them."""
 
     def __init__(self, path: Path, sources: Sources) -> None:
         self._kinds, self._sources = load_kinds(sources), sources
@@ -93,7 +93,7 @@ class _Reader:
             raise SceneError([Mistake(shown(path), "", "", _SCENE.format(path.name))])
         given = self._data.get("set")
         self._changes: Values = given if isinstance(given, dict) else {}
-        # By the key of each axis what reads its values, where they are numbers.
+        # By the key of each axis, the reader of its values where they are numbers.
         self._numbers = dict[str | None, Number | None]()
 
     def sweep(self, overrides: Sequence[str]) -> Sweep:
@@ -102,7 +102,7 @@ class _Reader:
         axes = self._axes(Layers(self._layers.path, base.as_dict()) if base else self._as_written())
         record = self._record(base or self._unchanged(), axes)
         bisect = self._bisect(axes)
-        if bisect and base and base.run.verdict == "window":  # of which no run is called steady
+        if bisect and base and base.run.verdict == "window":  # whose runs are never called steady
             bisect = replace(bisect, holds=OF_WINDOW.get(bisect.holds, bisect.holds))
         if self._layers.mistakes or table is None or base is None:
             raise SceneError(self._layers.mistakes)
@@ -142,14 +142,14 @@ class _Reader:
         return found(Path(name), "scenes", self._layers.path.parent)
 
     def _unchanged(self) -> Scene | None:
-        """Returns the scene without what is laid over it, where that is all that is wrong with it."""
+        """Returns the scene without what is laid over it, where nothing else is wrong with it."""
         try:
             return scene_file.load(self._scene_path(self._data["scene"]), (), self._kinds)
         except (SceneError, LookupError, TypeError):
             return None
 
     def _as_written(self) -> Layers | None:
-        """Returns the scene as its files and ``set`` have it, where something is wrong with it; None of no tables."""
+        """Returns the scene as its files and ``set`` have it, where something is wrong with it; None without tables."""
         name, table = self._data.get("scene"), self._data.get("base")
         with suppress(SceneError, TypeError):
             layers = Layers(self._layers.path, deepcopy(table)) if isinstance(table, dict) else None
@@ -172,7 +172,7 @@ class _Reader:
         return [axis for key, values in given.items() if whole and (axis := self._axis(key, values, whole))]
 
     def _with_first_names(self, base: Layers) -> Layers:
-        """Returns the base with the first name or table of each such axis, which may bring the keys of another axis."""
+        """Returns the base with the first value of each axis of names or tables, which may bring keys of another axis."""
         firsts = {key: values[0] for key, values in self._data["axes"].items() if isinstance(values, list) and values}
         names = {key: value for key, value in firsts.items() if not isinstance(value, int | float) and key_path(key)}
         layers = Layers(self._layers.path, base.data)
@@ -224,7 +224,7 @@ class _Reader:
             return None
 
     def _names_fit(self, at: KeyPath, key: str, values: Sequence[Any], scene: Layers) -> bool:
-        """Tells whether the key takes each value; what the rest of a scene says to it is known cell by cell."""
+        """Tells whether the key takes each value; whether it suits the rest of a scene is known only cell by cell."""
         count = len(self._layers.mistakes)
         for place, value in enumerate(values):
             try:
@@ -249,8 +249,10 @@ class _Reader:
         return make_columns(names, Sweep("", base, tuple(axes), sources=self._sources), self._kinds, complain)
 
     def _bisect(self, axes: Sequence[Axis]) -> Bisect | None:
-        """Returns the bisection; None where there is none, or it cannot be made: what the model of its table says is
-        told already."""
+        """Returns the bisection; None where there is none, or it cannot be made.
+
+        Mistakes that the model of its table finds have been reported already.
+        """
         given = self._data.get("bisect")
         if not isinstance(given, dict) or not isinstance(key := given.get("axis"), str):
             return None
@@ -272,7 +274,7 @@ class _Reader:
         return Bisect(key, given.get("holds", "steady"), Tolerance(tolerance, float(relative or 0.0)))
 
     def _tolerance(self, given: Any, number: Number | None) -> float:
-        """Returns the tolerance in the unit of its axis; 0 where it is none or wrong, or that axis is not known."""
+        """Returns the tolerance in the unit of its axis; 0 where it is missing or wrong, or the axis is not known."""
         if given is None or number is None:
             return 0.0
         try:

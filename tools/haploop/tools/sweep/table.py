@@ -16,15 +16,15 @@ from haploop.logger.summary import versions
 from haploop.protocol.files import demand_regular, read_text
 from haploop.protocol.names import meant
 
-# What stands in every table beside the axes and what is recorded.
+# Columns of every table beside the axes and what is recorded.
 CELL, SEED, ENDED, WHY, SCENE = "cell", "seed", "ended", "why", "scene"
 # Kinds of column, and the types they have in Parquet.
 NUMBER, WHOLE, TEXT, TRUTH = "float64", "int64", "string", "bool"
-# Stands between the texts of a list that is recorded.
+# Separates the texts of a list that is recorded.
 JOINS = "; "
-# What a verdict rests on.
+# Column of what a verdict rests on.
 PROVISOS = "stability.provisos"
-# A row by column: numbers, text, truth values, None where there is nothing.
+# A row, by column: numbers, text, truth values, None where there is no value.
 Row = dict[str, Any]
 # What sweep.toml holds: title, repeat, record, axes (values by key), bisect and base, the tables of the scene.
 ResolvedSweep = dict[str, Any]
@@ -56,7 +56,7 @@ class Column:
 
 
 def make_schema(columns: Iterable[Column], sweep: str) -> Any:
-    """Makes the schema; units stand in the metadata of the fields, the resolved sweep and the versions in its own."""
+    """Makes the schema: units are in the metadata of the fields, the resolved sweep and the versions in its own."""
     arrow = pyarrow()
     fields = []
     for column in columns:
@@ -66,7 +66,7 @@ def make_schema(columns: Iterable[Column], sweep: str) -> Any:
     return schema.with_metadata({**schema.metadata, _CHECKSUM: _checksum(schema)})
 
 
-# Key of the metadata: CRC-32 of what says which numbers a table holds; those have checksums of their own.
+# Key of the metadata: CRC-32 of the description of a table's numbers; the numbers have their own checksums.
 _CHECKSUM = b"checksum"
 
 
@@ -81,7 +81,7 @@ def write_table(table: Any, file: Any) -> None:
 
 
 def make_table(rows: Sequence[Row], schema: Any) -> Any:
-    """Makes an Arrow table of rows; what a row does not have is null."""
+    """Makes an Arrow table of rows; values that a row does not have are null."""
     arrow = pyarrow()
     arrays = [arrow.array([row.get(field.name) for row in rows], type=field.type) for field in schema]
     return arrow.Table.from_arrays(arrays, schema=schema)
@@ -91,7 +91,7 @@ SWEEP, TABLE, BOUNDARY, PARTS = "sweep.toml", "table.parquet", "boundary.parquet
 
 
 class TableError(Exception):
-    """There is no sweep's table to be read; the message says why."""
+    """A sweep's table cannot be read; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -99,11 +99,11 @@ class SweepTable:
     """The results of a sweep so far; ``table["wall.stiffness"]`` is a column.
 
     Attributes:
-        columns: by name, equally long, in the order of the cells: float64 (NaN where there is nothing), int64, bool,
-            or objects (str, None where there is nothing).
+        columns: by name, equally long, in the order of the cells: float64 (NaN where there is no value), int64, bool,
+            or objects (str, None where there is no value).
         units: of the columns that have one.
         sweep: the resolved sweep.
-        boundary: the columns of the boundaries; empty where none were sought, or as long as the sweep goes on.
+        boundary: the columns of the boundaries; empty where none were sought, or while the sweep is not finished.
         finished: whether every cell is there.
     """
 
@@ -134,7 +134,7 @@ def is_sweep(directory: Path) -> bool:
 
 
 def read(directory: str | Path) -> SweepTable:
-    """Reads the table of a sweep, of a running or interrupted one as far as it is written.
+    """Reads the table of a sweep; of a running or interrupted one, as much as is written.
 
     Raises:
         TableError: there is no sweep there, or its table cannot be read.
@@ -161,11 +161,11 @@ def read(directory: str | Path) -> SweepTable:
 
 
 def read_part(path: Path, sweep: str) -> Any:
-    """Reads a Parquet file of a sweep, whose text it holds; TableError where it is damaged or of another one."""
+    """Reads a Parquet file of a sweep, whose text it holds; TableError where it is damaged or of another sweep."""
     arrow, why = pyarrow(), "it is none that haploop wrote"
     try:
         demand_regular(path)
-        # Threads and read-ahead would keep memory of their own for every file.
+        # Threads and read-ahead would keep extra memory for every file.
         file = arrow.parquet.ParquetFile(path, page_checksum_verification=True)
         table = file.read(use_threads=False)
         held = table.schema.metadata or {}

@@ -22,7 +22,7 @@ from haploop.protocol.names import nearest
 from haploop.tools.dissipate.recording.samples import Floats, RecordingError
 
 _BLOCK_ROWS = 16_384
-# How a text of that code begins.
+# First bytes of a text in that code.
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 # What a cell without a value may hold.
 _MISSING = ("", "-", "--", "na", "n/a", "none", "null")
@@ -30,7 +30,7 @@ _MISSING = ("", "-", "--", "na", "n/a", "none", "null")
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a file, counted from 0, its name or number from 1, and its unit from the header's brackets."""
+    """One column of a file: its index from 0, its name or number from 1, and its unit from the header's brackets."""
 
     index: int
     name: str
@@ -38,13 +38,13 @@ class Column:
 
 
 class DelimitedFile:
-    """Reads text of one row a line; lines of a title, a header, a row of units, lines that begin with # and empty ones
-    may be there.
+    """Reads text with one row per line; it may have title lines, a header, a row of units, lines that begin with #, and
+    empty lines.
 
     The first row with a number begins the table: its cells are separated by tabs, semicolons, commas or blanks,
-    whichever it has, in this order. With semicolons a comma is taken for the decimal point. The row above is the
-    header; where half of its cells are units and the one above has as many, they are its units. What stands above is a
-    title.
+    whichever of these it contains first in this order. With semicolons a comma is taken for the decimal point. The row
+    above is the header; where half of its cells are units and the row above that has as many cells, it holds the units
+    and the row above it is the header. Anything above is a title.
 
     Attributes:
         columns: by the names of the header, or numbered from 1.
@@ -52,7 +52,7 @@ class DelimitedFile:
     """
 
     def __init__(self, path: Path) -> None:
-        """Finds delimiter and columns from the beginning of the file; RecordingError without a file or a row."""
+        """Finds delimiter and columns from the beginning of the file; raises RecordingError without a file or a row."""
         self.path = path
         with _open_lines(self.path) as lines:
             first = list(itertools.islice((line for line in lines if line.strip()), 50))
@@ -101,7 +101,7 @@ class DelimitedFile:
         return found[0]
 
     def find(self, names: Sequence[str]) -> Column | None:
-        """Returns the first column that has one of these names in any case; None for none."""
+        """Returns the first column that has one of these names in any case; None if there is none."""
         return next(iter(self.all_of(names)), None)
 
     def all_of(self, names: Sequence[str]) -> list[Column]:
@@ -109,12 +109,13 @@ class DelimitedFile:
         return [column for name in names for column in self.columns if column.name.lower() == name]
 
     def blocks(self, columns: Sequence[Column]) -> Iterator[tuple[Floats, Floats]]:
-        """Yields numbers of these columns, shape (rows, columns), and the line of each row, shape (rows,).
+        """Yields the numbers of these columns, shape (rows, columns), and the line of each row, shape (rows,).
 
         A cell that is empty, missing at the end of a line, or not finite is NaN.
 
         Raises:
-            RecordingError: a cell is neither a number nor empty, or its quotes do not end; it names the line.
+            RecordingError: a cell is neither a number nor empty, or its quotes are not closed; the message names the
+                line.
         """
         wanted = [column.index for column in columns]
         with _open_lines(self.path) as lines:
@@ -136,7 +137,7 @@ class DelimitedFile:
                 yield table, np.array([float(n) for n, _ in chunk])
 
     def _refuse_more_cells(self, rows: Sequence[Sequence[str]], chunk: Sequence[tuple[int, str]]) -> None:
-        """Refuses a row with more cells than there are columns: what follows would be read from another's."""
+        """Refuses a row with more cells than columns: what follows would be read from the wrong column."""
         for row, (line, _) in zip(rows, chunk, strict=True):
             if len(row) > len(self.columns) and any(cell.strip() for cell in row[len(self.columns) :]):
                 commas = " Decimal commas need semicolons, tabs or blanks between the cells." * (self._delimiter == ",")

@@ -1,4 +1,4 @@
-"""Limits of what a recorded device can have done: beyond them a unit is wrong more often than the device unusual."""
+"""Limits of what a recorded device can have done: beyond them, more often a unit is wrong than the device unusual."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.render.units import amount
 
-# Velocities are taken over so long, s: from sample to sample the counts of an encoder look faster than any hand.
+# Time over which velocities are taken, s: from sample to sample an encoder's counts look faster than any hand.
 _OVER_S = 0.01
 
 
 class Limits(NamedTuple):
-    """What a quantity may be, in its SI unit, and the option that gives the unit of its column."""
+    """The range of a quantity, in its SI unit, and the option that gives the unit of its column."""
 
     words: str
     unit: str
@@ -36,7 +36,7 @@ _CAN_HARDLY_BE = "Can that be meant: {what}? If not, a unit is wrong; say with {
 
 
 class Largest:
-    """Keeps the largest of every quantity of a recording."""
+    """Keeps the largest value of every quantity of a recording."""
 
     def __init__(self, period_s: float) -> None:
         self._period_s, self._apart = period_s, max(1, round(_OVER_S / period_s))
@@ -54,7 +54,7 @@ class Largest:
             self._found[name] = float(np.max(np.abs(values), initial=self._found.get(name, 0.0)))
 
     def remarks(self) -> list[str]:
-        """Returns a sentence on each quantity outside its limits; what is nought throughout has no unit to be wrong."""
+        """Returns a sentence on each quantity outside its limits; one that is 0 throughout has no unit to be wrong."""
         found = ((_LIMITS[name], value) for name, value in self._found.items())
         return [
             _CAN_HARDLY_BE.format(what=of.words.format(amount(value, of.unit)), option=of.option)

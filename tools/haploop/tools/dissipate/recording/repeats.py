@@ -6,23 +6,24 @@ import numpy as np
 
 from haploop.tools.dissipate.recording.samples import Floats
 
-# Steps before and after a pause, in counts, of one direction: a device this fast does not stand still, but where it
-# turns.
+# Least steps before and after a pause, in counts, in the same direction: a device this fast does not stand still except
+# where it turns.
 _MOVING_COUNTS = 3.0
-# Pauses are looked for in blocks of so many samples, and are no longer than so many.
+# Pauses are looked for in blocks of this many samples, and are no longer than this many.
 _BLOCK, _LONGEST = 4096, 50
-# They come at even intervals, to a sample, where their spectrum has a line of so much of what it then has at least; one
-# whose square is so many times their number is found in one of a thousand blocks of pauses that come by chance.
+# Pauses come at even intervals, to a sample, where their spectrum has a line of at least this share of the least height
+# that such pauses give; a line whose square is this many times their number is found in one of a thousand blocks of
+# pauses that come by chance.
 _EVEN, _BEYOND_CHANCE = 0.9, 15.0
-# The spectrum is that of so many times as many samples, 0 beyond: a line between its places is no lower.
+# Each block is padded with zeros to this many times its length, so that a line between two places is no lower.
 _PADDED = 4
 
 
 def repeats(x: Floats) -> int:
-    """Returns how many samples repeat the one before in mid-motion, of positions, shape (samples,), without a gap.
+    """Returns how many positions repeat the one before in mid-motion; ``x`` has shape (samples,) and no gap.
 
-    Counted are those of blocks in which the pauses come at even intervals, as those of a sensor with a rate of its own
-    do: by chance, as where noise is rounded, they come at any.
+    Only blocks in which the pauses come at even intervals count, as those of a sensor with its own rate do; pauses by
+    chance, as where noise is rounded, come at any interval.
     """
     return sum(_repeats(x[at : at + _BLOCK]) for at in range(0, len(x), _BLOCK))
 

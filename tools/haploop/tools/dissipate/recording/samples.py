@@ -1,4 +1,4 @@
-"""Samples of a recorded motion, notes on what was found, and the recording that a run's log is."""
+"""Samples of a recorded motion, notes on what was found, and a run's log as a recording."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase, TimebaseError
 
 Floats = NDArray[np.float64]
-# Share of the periods from which on uneven ones are told before anything else.
+# Share of uneven periods above which they are reported before anything else.
 UNEVEN_SHARE = 0.01
 
 
@@ -32,15 +32,15 @@ class Samples:
     Attributes:
         x_m, true_x_m: position measured by the controller, and that of the device.
         v_m_s, a_m_s2: velocity and acceleration as recorded; None where they are to be estimated.
-        between_x_m: its position within the period after each sample, when a delayed force changes; None for a straight
-            line from sample to sample.
-        begins: whether a gap lies before it, or it is the first.
+        between_x_m: position of the device when a delayed force changes, within the period after each sample; None for
+            a straight line from sample to sample.
+        begins: whether the piece is the first, or follows a gap.
         end_x_m: position a period after the last sample; None where it is in the next piece, or not known.
         force_N: recorded force on the device, along the position; None where it was not read.
         held_N: mean of the force held in the period after each sample, where that is known.
         taken_J: what the force took out of the device in the period after each sample, where that is known exactly.
-        unknown: samples at its beginning whose velocity or acceleration would need those in the gap before: no element
-            is taken to act there.
+        unknown: number of samples at its beginning whose velocity or acceleration would need those in the gap before:
+            no element is taken to act there.
     """
 
     t_s: Floats
@@ -63,11 +63,11 @@ class Notes:
 
     Attributes:
         gaps_s: begin and end of each gap, s; the first hundred.
-        bridged: single samples that were missing and are the mean of their neighbours.
-        repeated: samples equal to the one before although the device moved on, by three counts or more, before and
-            after, where they come at even intervals.
-        uneven: periods that are more than a tenth off the others, or than rounding makes them.
-        rounded_s: the step to which times are rounded that are even but for that, s; 0 where nothing of it is seen.
+        bridged: single missing samples, replaced by the mean of their neighbours.
+        repeated: samples equal to the one before although the device moved by three counts or more before and after,
+            where they come at even intervals.
+        uneven: periods that are off the others by more than a tenth, and more than rounding causes.
+        rounded_s: the step to which otherwise even times are rounded, s; 0 where no rounding is seen.
     """
 
     rows: int = 0
@@ -93,7 +93,7 @@ class Notes:
             self.gaps_s.append((from_s, to_s))
 
 
-# Of a log, the columns that are read, by channel.
+# The columns of a log that are read, by channel.
 _COLUMNS = {"/controller": ("timestamp", "x", "v", "a", "total"), "/plant": ("x", "force")}
 
 
@@ -110,11 +110,11 @@ def read_scene(path: Path) -> Scene:
 
 
 class LogRecording:
-    """Reads samples from a run's log; in between, the plant's own steps where they were logged.
+    """Reads samples from a run's log, and the plant steps between them where these were logged.
 
-    The force of tick k would have acted from step k n + d on, n steps a tick, d the scene's delay or another one. The
-    recorded force is that commanded in all; its work is that of the force held at every plant step, where they were
-    logged.
+    The force of tick k would have acted from step k n + d on, with n steps per tick and d the scene's delay or another
+    one. The recorded force is the total commanded; its work is that of the force held at every plant step, where the
+    steps were logged.
 
     Args:
         delay_s: delay of the forces; that of the scene when None.
@@ -172,10 +172,10 @@ class LogRecording:
 
 
 class _Waiting:
-    """Holds rows of both channels until those of the other have come.
+    """Holds rows of each channel until those of the other have come.
 
     Args:
-        n, late: plant steps a tick, and the one of them at which a delayed force changes.
+        n, late: plant steps per tick, and the one among them at which a delayed force changes.
     """
 
     def __init__(self, n: int, late: int, of_steps: bool) -> None:

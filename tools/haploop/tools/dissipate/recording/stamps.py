@@ -1,4 +1,4 @@
-"""The period of samples whose time stamps are rounded: even ones, as far as the rounding tells."""
+"""The period of samples whose time stamps are rounded but even, as far as the rounding shows."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ import numpy as np
 
 from haploop.tools.dissipate.recording.samples import Floats
 
-# Digits behind the point that are looked for: stamps with more are taken as they are.
+# Decimal places that are tried: stamps with more are taken as they are.
 _DIGITS = range(-6, 8)
 _ROUNDING = 1e-6
-# Steps of an even grid differ by what they are rounded to, and no more; longer ones are gaps.
+# Steps of an even grid differ by the step of the rounding at most; longer ones, by this factor, are gaps.
 _LONGER = 1.1
-# Thirds that are taken off what is searched.
+# How many times a third is cut off the range that is searched.
 _NARROWER = 40
-# So many samples without a gap tell a period, at least.
+# Fewest samples without a gap that give a period.
 _FEWEST = 16
-# Periods below which a single sample is missing in a step, or in two of which one is late.
+# A step too long for one period but shorter than this many has a single sample missing; two neighbouring steps that are
+# together shorter than this have none missing, but a late or early one.
 ONE_MISSING = 2.5
-# Times scatter where of a hundred steps this many differ from the median by no less than this share of it.
+# Times scatter where this percentile of the deviations of steps from their median is no less than this share of it.
 _OF_STEPS, _SCATTER = 80, 0.02
 
 Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
@@ -27,19 +28,19 @@ Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
 @dataclass(frozen=True)
 class Stamps:
-    """The period of samples, and the step to which their times are rounded; 0 where nothing of it is seen, s."""
+    """The period of samples, s, and the step to which their times are rounded, s; 0 where no rounding is seen."""
 
     period_s: float
     rounded_s: float = 0.0
 
 
 def stamps(times: Floats, unit_s: float) -> Stamps:
-    """Returns the period of samples from the times in seconds that stood in a file in some unit.
+    """Returns the period of samples from their times in seconds; ``unit_s``: the unit in which a file gave them.
 
-    An even grid t0 + k P, rounded to a step r or cut off, deviates from a line by no more than r from its least to its
-    greatest deviation. Where all do, though their steps differ, P is that of the line through them (a whole number of
-    samples a second where that fits as well); otherwise it is the median of the steps, or where they scatter that of
-    the line through the times over their places.
+    An even grid t0 + k P, rounded or truncated to a step r, deviates from a line by no more than r from its least to
+    its greatest deviation. Where all times do so although their steps differ, P is the slope of the line through them
+    (that of a whole number of samples a second where it fits as well); otherwise it is the median of the steps or,
+    where they scatter, the slope of the line through the times over their places.
     """
     steps = np.diff(times)
     median_s = float(np.median(steps))
@@ -55,7 +56,7 @@ def stamps(times: Floats, unit_s: float) -> Stamps:
 
     period_s = float(np.polyfit(places, longest, 1)[0])
     low_s, high_s = period_s - rounded_s / len(longest), period_s + rounded_s / len(longest)
-    for _ in range(_NARROWER):  # that of the narrowest band, which is a convex function of the period
+    for _ in range(_NARROWER):  # for the narrowest band, whose width is a convex function of the period
         left_s, right_s = (2.0 * low_s + high_s) / 3.0, (low_s + 2.0 * high_s) / 3.0
         low_s, high_s = (low_s, right_s) if width_s(left_s) < width_s(right_s) else (left_s, high_s)
     some = 1.0 / max(1.0, round(1.0 / period_s)), period_s, (low_s + high_s) / 2.0
@@ -64,16 +65,16 @@ def stamps(times: Floats, unit_s: float) -> Stamps:
 
 
 def is_late(steps: Floats, period_s: float) -> Flags:
-    """Tells of steps between samples whether the sample at either end is late or early, so that none is missing.
+    """Tells for each step between samples whether the sample at either end is late or early, so that none is missing.
 
-    The step beside it is as much shorter then.
+    The neighbouring step is then shorter by as much.
     """
     padded = np.concatenate([[np.inf], steps, [np.inf]])
     return np.minimum(padded[:-2], padded[2:]) + steps < ONE_MISSING * period_s
 
 
 def _scattered_s(times: Floats, steps: Floats, median_s: float) -> float:
-    """Returns the mean period of times that scatter about an even grid; the median of steps that do not."""
+    """Returns the mean period of times that scatter about an even grid; the median step of those that do not."""
     if len(times) < _FEWEST or np.percentile(np.abs(steps - median_s), _OF_STEPS) < _SCATTER * median_s:
         return median_s
     counts = np.where(is_late(steps, median_s), 1.0, np.maximum(1.0, np.round(steps / median_s)))

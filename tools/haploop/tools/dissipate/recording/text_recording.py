@@ -21,18 +21,19 @@ _TIMES = ("t", "time", "timestamp", "time_s", "t_s", "seconds")
 _POSITIONS = ("x", "position", "pos", "position_m", "x_m", "displacement")
 # Columns that may be a force, which is read only where it is asked for: its sign and its hold are not in the file.
 _FORCES = ("force", "force_n", "f_n", "f")
-# Times without a unit are seconds by these names; by others only if they are not far apart.
+# Times without a unit are seconds under these names; under others only if they are not far apart.
 _SORT = "sort its rows by time."
 _TOO_FAST = "give the rate with --rate if samples came faster than their clock."
 _IN_SECONDS = ("time_s", "t_s", "seconds")
 _FAR_APART_S = 0.1
-# Positions without a unit are metres by these names.
+# Positions without a unit are metres under these names.
 _IN_METRES = ("position_m", "x_m")
-# Periods above which there is a gap between two samples; deviation above which a period is uneven.
+# Periods between two samples above which there is a gap; relative deviation above which a period is uneven.
 _GAP, _UNEVEN = 1.5, 0.1
 # No quantity of a device is greater, in SI units.
 _MOST = 1e10
-# Positions without a unit that are further apart, m, are asked after, or said to be taken for metres.
+# Spans of positions without a unit, m, above which the unit is asked for, or a remark says that they are taken for
+# metres.
 _FAR_M, _DOUBTFUL_M = 1.0, 0.1
 # Shortest and longest period that is accepted.
 _PERIODS_S = 1e-7, 1e3
@@ -40,11 +41,11 @@ _PERIODS_S = 1e-7, 1e3
 
 @dataclass(frozen=True)
 class Layout:
-    """The columns to read, by names or numbers from 1, and their units; None for what is looked for, or is not there.
+    """The columns to read, by names or numbers from 1, and their units; None for one to be looked for, or not there.
 
     Attributes:
-        rate_Hz: samples a second, where there is no time.
-        length: unit of the position, such as "mm", or metres a count.
+        rate_Hz: samples a second, where there is no column of times.
+        length: unit of the position, such as "mm", or metres per count.
     """
 
     position: str | None = None
@@ -63,9 +64,9 @@ class Layout:
 class TextRecording:
     """Reads samples from a text file, a control period apart; between them the device moves in straight lines.
 
-    The period is that of the rate where one is given, else that of an even grid where the times are one, rounded, else
-    the median of the periods at the beginning. Beyond that times count only where samples are missing: a controller
-    that counts its ticks takes no notice of how late each of them is.
+    The period is that of the rate where one is given, else that of an even grid where the times are one apart from
+    rounding, else the median of the periods at the beginning. Otherwise times matter only where samples are missing: a
+    controller that counts its ticks does not notice how late each of them is.
     """
 
     between = "straight lines"
@@ -169,11 +170,11 @@ class TextRecording:
 
     @property
     def _longest_s(self) -> float:
-        """The longest step without a gap; rounding alone makes one as much longer as it rounds to."""
+        """The longest step without a gap; rounding alone can lengthen one by the step of the rounding."""
         return max(_GAP * self.period_s, self.period_s + self.notes.rounded_s * (1.0 + _UNEVEN))
 
     def _lacks(self, steps: Floats) -> Flags:
-        """Tells of steps between samples whether one is missing within; on a rounded even grid none is late."""
+        """Tells for each step between samples whether one is missing within it; on a rounded even grid none is late."""
         longer = steps > self._longest_s
         return longer if self.notes.rounded_s else longer & ~is_late(steps, self.period_s)
 
@@ -220,7 +221,7 @@ class TextRecording:
             )
 
     def _widen(self, x: Floats) -> None:
-        """Keeps lowest and highest position; RecordingError where they can hardly be metres and none are named."""
+        """Keeps lowest and highest position; RecordingError where they can hardly be metres and no unit was named."""
         low, high = self._reach_m = min(self._reach_m[0], float(x.min())), max(self._reach_m[1], float(x.max()))
         if not self._in_metres and high - low > _FAR_M:
             raise RecordingError(
@@ -229,7 +230,7 @@ class TextRecording:
             )
 
     def _rows(self) -> Iterator[tuple[dict[str, Floats], Floats]]:
-        """Yields SI columns by quantity, of all usable rows, and the rows' lines (time from the rate if given)."""
+        """Yields all usable rows: SI columns by quantity (time from the rate if given), and the line of each row."""
         names, row = list(self._columns), 0
         self.notes.rows = self.notes.unusable_rows = 0
         for table, lines in self._file.blocks(list(self._columns.values())):
@@ -245,7 +246,7 @@ class TextRecording:
                 yield {name: column[usable] for name, column in columns.items()}, lines[usable]
 
     def _bridged(self, columns: dict[str, Floats], lines: Floats) -> tuple[dict[str, Floats], Floats]:
-        """Returns the rows with the mean of both neighbours where a single one is missing between them."""
+        """Returns the rows, with the mean of both neighbours inserted where a single one is missing between them."""
         steps = np.diff(columns["time"])
         at = np.flatnonzero(self._lacks(steps) & (steps < ONE_MISSING * self.period_s)) + 1
         self.notes.bridged += len(at)

@@ -11,35 +11,36 @@ from haploop.tools.dissipate.recording.samples import Floats
 
 Course = Literal["stayed", "grew", "died down", "varied"]
 
-# Each window is told at so many places; it fits so many periods around each, but no less than so long and no more
-# than this share of the window.
+# Each window is evaluated at this many places; the fit around each spans this many periods, but no less than this long,
+# s, and no more than this share of the window.
 PLACES = 32
 _PERIODS, _LEAST_S, _MOST = 3.0, 0.03, 0.6
 # The degree of the drift that is fitted beside the sine.
 _DRIFT = 2
-# It changed by so much at least, and by more than so many standard errors, as far apart as extremes of noise may lie.
+# A width has changed by at least this factor, and by more than this many standard errors, as far apart as extremes of
+# noise may lie.
 TELLS, _UNSURE = 1.2, 7.0
-# It grew all the way, or died down, where it never went back by more than this share of the change.
+# A swing grew or died down all the way where it never went back by more than this share of the change.
 _BACK = 0.15
-# Where it swings all along a part of a window it is nowhere narrower there than this share of its widest place.
+# A swing that fills a part of a window is nowhere narrower there than this share of its widest place.
 _FILLS = 0.5
 _WAYS: dict[Course, int] = {"grew": 1, "died down": -1}
 
 
 @dataclass(frozen=True, eq=False)
 class Widths:
-    """Widths along a window, m, peak to peak of the sine that fits around each place; and their standard error, m."""
+    """Widths along a window, m, peak to peak of the sine fitted around each place, and their standard error, m."""
 
     width_m: Floats
     error_m: float
 
     def varies(self, places: slice) -> bool:
-        """Tells whether the widths at some places differ by more than a tenth and than noise makes them."""
+        """Tells whether the widths at some places differ by more than a tenth and what noise causes together."""
         some = self.width_m[places]
         return bool(np.ptp(some) > 0.1 * some.mean() + _UNSURE * self.error_m)
 
     def fills(self, places: slice) -> bool:
-        """Tells whether it swings at all of some places, and what is there is neither its onset nor its end."""
+        """Tells whether the swing is there at all of some places, neither at its onset nor at its end."""
         some = self.width_m[places]
         return bool(some.min() > _FILLS * some.max())
 
@@ -47,10 +48,10 @@ class Widths:
 def widths(x_m: Floats, rate_Hz: float, frequency_Hz: float) -> Widths:
     """Returns the widths of a swing at ``PLACES`` places along a window.
 
-    Around each place a sine of that frequency and a parabola are fitted under a window of Hann: of a swing that beats
-    or grows this follows the width to some 3 % where that changes ten times as slowly as it swings. Near the ends of
-    the window the nearest place counts around which the samples suffice. The error is that of white noise as wide as
-    what the fits leave over.
+    Around each place a sine of that frequency and a parabola are fitted under a Hann window: this follows the width of
+    a swing that beats or grows to some 3 % where the width changes ten times as slowly as it swings. Near the ends of
+    the window the fit is that of the nearest place with enough samples around it. The error is that of white noise as
+    large as the residual of the fits.
     """
     count = len(x_m)
     size = int(min(max(_PERIODS / frequency_Hz, _LEAST_S) * rate_Hz, _MOST * count)) | 1
@@ -70,7 +71,7 @@ def widths(x_m: Floats, rate_Hz: float, frequency_Hz: float) -> Widths:
 
 
 def course(width_m: Floats, error_m: float) -> Course:
-    """Returns what became of a swing by its widths in the order of time, m."""
+    """Returns the course of a swing from its widths in the order of time, m."""
     least_m, most_m = float(width_m.min()), float(width_m.max())
     if most_m < TELLS * least_m or most_m - least_m < _UNSURE * error_m:
         return "stayed"

@@ -1,4 +1,4 @@
-"""Mean power that a recorded force gives to a swing, by the lines of their spectra."""
+"""Mean power that a recorded force gives to a swing, from the lines of their spectra."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from haploop.logger.verdict.about_trend import about_trend
 from haploop.tools.dissipate.recording.samples import Floats
 
-# A force gives to the swing, or takes, from so much on of what it would at most.
+# A force gives to the swing, or takes from it, from this share on of the most that it could.
 LEAST_FED = 0.01
-# A swing has its own frequency and the overtones that shape it; higher ones hold less than the noise of all lines.
+# A swing has its own frequency and the overtones that shape it; higher overtones hold less than the noise of all lines.
 _ORDERS = range(1, 6)
-# Lines this near one are part of it under a window of Hann.
+# Lines this near another, in lines, are part of it under a Hann window.
 _NEAR = 2.5
 
 
@@ -20,8 +20,8 @@ def fed_W(x_m: Floats, force_N: Floats, rate_Hz: float, frequency_Hz: float, del
 
     Each force is held for a period T from its delay d on: it gives F[k] (x(t[k] + d + T) - x(t[k] + d)), of which the
     mean is Re(conj(F) X exp(i w d) (exp(i w T) - 1)) / T, summed over the lines of the swing and of its first
-    overtones: one of a tenth of its width gets as much as 4 % from a delayed spring. A slower press has no part in it,
-    nor what it stores; nor has the rounding of the positions, but for its share in these lines.
+    overtones: an overtone of a tenth of its width gets as much as 4 % from a delayed spring. A slower press does not
+    contribute, nor does the energy that it stores, nor the rounding of the positions beyond its share in these lines.
     """
     count, window = len(x_m), np.hanning(len(x_m) + 1)[:-1]
     at_Hz = np.fft.rfftfreq(count, 1.0 / rate_Hz)

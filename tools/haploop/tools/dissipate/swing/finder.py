@@ -25,26 +25,27 @@ from haploop.tools.dissipate.swing.several import SeveralFinder
 from haploop.tools.dissipate.swing.windows import End, Window, widest_m
 from haploop.view.look.spectrum import Line, amplitudes, main_line
 
-# It goes on to the end of a part whose last half second it swings through, this share of the window before as wide.
+# A swing continues to the end of a part if it lasts through its last half second with at least this share of the width
+# in the window before.
 _GOES_ON = 0.9
-# A gap of no more than this, after so many times as many samples without one, is bridged by a straight line: the swing
-# loses no more of its width than the gap is of a window.
+# A gap no longer than this, s, after at least this many times as many samples without one, is bridged by a straight
+# line: the share of its width that the swing loses is no more than the gap's share of a window.
 _BRIDGED_S, _BETWEEN = 0.01, 10
 
 
 class BuzzFinder:
-    """Looks for a swing in windows, in bounded memory but for a row a window.
+    """Looks for a swing in windows, in memory that is bounded except for one row per window.
 
     Args:
-        delay_s: from a sample to its force, where one is recorded.
-        band: its frequencies, and how long a window is.
+        delay_s: time from a sample to its force, where one is recorded.
+        band: the frequencies of the swing, and the length of a window.
 
     Attributes:
-        longest_s: the longest part without a gap that is not bridged.
-        short_s: how long parts without such a gap lasted together that were too short for a swing that lasts.
-        slow: the widest line slower than the band; None of a motion without one.
-        slower: beside a buzz, the search for a swing just slower than that.
-        hidden: swings that are no wider than a staircase of counts may be.
+        longest_s: length of the longest part without a gap that is not bridged.
+        short_s: total length of the parts without such a gap that were too short for a swing that lasts.
+        slow: the widest line slower than the band; None without one.
+        slower: in the search for a buzz, that for a swing just slower than a buzz.
+        hidden: the search for swings that are no wider than a staircase of counts may be.
     """
 
     def __init__(self, period_s: float, delay_s: float = 0.0, band: Band = FAST) -> None:
@@ -56,20 +57,20 @@ class BuzzFinder:
         self._t_s, self._motion = np.empty(0), np.empty((3, 0))
         self._begins_s = self.longest_s = self._shorter_s = 0.0
         self.slow: Line | None = None
-        # Windows that swing, in stretches without one that does not or has another frequency.
+        # Windows that swing, in stretches; a window that does not, or has another frequency, ends a stretch.
         self._stretches: list[list[Window]] = [[]]
-        # Of the last window of a part without a gap, where a swing that ends in it did -> the end of the part.
+        # For parts without a gap: time at which a swing in the last window of the part ended -> the end of the part.
         self._part_ends = dict[float, End]()
-        # Where in what is kept, which begins with the last window, the next one does.
+        # Index of the next window in the samples kept, which begin with the last window.
         self._next = 0
         # Samples since the last gap, bridged or not.
         self._whole = 0
         self._left_out: list[Overtone] = []
-        # Of every window, what is faster than the band's least frequency, r.m.s., m; 0 between parts.
+        # R.m.s. motion of every window faster than the band's least frequency, m; 0 between parts.
         self._fast_m: list[float] = []
 
     def add(self, piece: Samples) -> None:
-        """Takes a piece; its times tell a rate that its period is only about."""
+        """Takes a piece; its times give a rate to which the period is only approximate."""
         if self.slower:
             self.slower.add(piece)
         missing = self._bridged(float(piece.t_s[0])) if piece.begins else 0
@@ -146,9 +147,9 @@ class BuzzFinder:
             last.append(Window(begins_s, to_s - inside_s, line, fed, (from_s, to_s - from_s), along, width_m))
 
     def _end_of_part(self) -> dict[float, End]:
-        """Returns the end of this part, by that of its last window, where it swings on to there; else nothing.
+        """Returns the end of this part, by the end of its last window, where the swing continues to it; else nothing.
 
-        The windows end up to a quarter of one earlier.
+        The windows end up to a quarter of a window earlier.
         """
         if not (last := self._stretches[-1]) or not self._next:
             return {}
@@ -182,7 +183,7 @@ class BuzzFinder:
         return found
 
     def _parted(self) -> tuple[list[list[Window]], list[Overtone]]:
-        """Returns of each stretch the part that lasts, and what was left out for an overtone of a slower motion."""
+        """Returns the part of each stretch that lasts, and the lines left out as overtones of a slower motion."""
         slower = self._slower()
         parts = [lasting(stretch, slower) for stretch in self._stretches]
         return [kept for kept, _ in parts if kept], [*self._left_out, *(one for _, left in parts for one in left)]
@@ -192,19 +193,19 @@ class BuzzFinder:
         return self._several.found(self._slower())[0]
 
     def fast_rms_m(self) -> float:
-        """Returns by how much it moves above 15 Hz, r.m.s., at least in every window of a second; 0 of less."""
+        """Returns the most r.m.s. motion above 15 Hz that every window of some second reaches; 0 without a second."""
         rows = [min(self._fast_m[at : at + NEEDED + 1]) for at in range(len(self._fast_m) - NEEDED)]
         return max(rows, default=0.0)
 
     def overtone(self) -> Overtone | None:
-        """Returns the widest line that lasted and was left out for an overtone; None where there was none."""
+        """Returns the widest line that lasted and was left out as an overtone; None where there was none."""
         _, left = self._parted()
         lasted = left if len(left) > NEEDED else []
         some = [*lasted, *self._several.found(self._slower())[1]]
         return max(some, key=lambda each: each.line.width, default=None)
 
     def word(self) -> Word:
-        """Returns whether the recording buzzes, as far as it can be said."""
+        """Returns whether the recording buzzes, as far as that can be said."""
         if self.buzz():
             return "buzzes"
         if self.several():

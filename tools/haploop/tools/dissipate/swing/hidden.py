@@ -1,4 +1,4 @@
-"""Swings that last but are no wider than a staircase of counts may be, so that whether it buzzes cannot be said."""
+"""Swings that last but are no wider than a staircase of counts may be, so that they may or may not be a buzz."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 from haploop.tools.dissipate.swing.buzz import Band
 from haploop.view.look.spectrum import Line
 
-# So many windows in a row, a quarter of one apart, are a swing that lasts.
+# This many windows in a row, a quarter of a window apart, are a swing that lasts.
 _LASTS = 5
 
 
@@ -20,7 +20,7 @@ class Hidden(NamedTuple):
 
 
 class HiddenFinder:
-    """Looks for a swing within the counts that keeps its frequency as long as one that is told.
+    """Looks for a swing within the counts that keeps its frequency as long as one that is reported.
 
     Attributes:
         found: the widest of them; None where there was none.
@@ -40,5 +40,5 @@ class HiddenFinder:
             self.found = widest
 
     def end(self) -> None:
-        """Takes a window without one, or a gap."""
+        """Takes a window without such a swing, or a gap."""
         self._row = []

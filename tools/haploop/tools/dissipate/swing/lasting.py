@@ -1,4 +1,4 @@
-"""The buzz in the windows that swing: which of them last, and what is told of them together."""
+"""The buzz in the windows that swing: which of them last, and what is reported of them together."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from haploop.tools.dissipate.swing.course import course
 from haploop.tools.dissipate.swing.lines import Slower, is_overtone
 from haploop.tools.dissipate.swing.windows import THIRD, End, Window, along_m, is_seen
 
-# The windows are a quarter of one apart; so many after the first have to swing as well for a swing to last.
+# The windows are a quarter of a window apart; this many after the first must swing as well for a swing to last.
 HOPS = 4
 NEEDED = HOPS
-# It does not decay below this share while it lasts: what is struck rings shorter.
+# A swing that lasts does not decay below this share meanwhile: what is struck rings for a shorter time.
 _KEPT = 0.7
-# The first window that a swing fills which began within the first, by number; one before it is left out where it is
-# less than ``_KEPT`` as wide.
+# Number of the first window that is filled by a swing which began within the first one; a window before it is left out
+# where it is less than ``_KEPT`` as wide.
 _FULL = HOPS - 1
 
 
 def lasting(stretch: list[Window], slower: Sequence[Slower]) -> tuple[list[Window], list[Overtone]]:
-    """Returns the part of a stretch that lasts without decaying; what is an overtone of the motion by itself."""
+    """Returns the part of a stretch that lasts without decaying; separately if it is an overtone of a slower motion."""
     widths = [window.line.width for window in stretch]
     decays = [widths[i + NEEDED] < _KEPT * max(widths[i : i + NEEDED]) for i in range(len(widths) - NEEDED)]
     whole = [i for i, of in enumerate(decays) if not of]
@@ -40,8 +40,8 @@ def make_buzz(
 ) -> Buzz | None:
     """Returns the buzz of the parts of stretches that last; None without one.
 
-    Where one stretch lasts, shorter ones at its frequencies count, too, as long as they are as wide. What still swings
-    at the end of a part of the recording goes on to it, as ``ends`` says by the end of its last window.
+    Where one stretch lasts, shorter ones at its frequencies count, too, if they are about as wide. A swing still there
+    at the end of a part of the recording continues to that end, which ``ends`` gives by the end of its last window.
     """
     kept = [window for part in parts for window in part]
     if not kept:
@@ -88,7 +88,7 @@ def make_buzz(
 
 
 def _joined(told: Sequence[Window], ends: Mapping[float, End], band: Band) -> tuple[Span, ...]:
-    """Joins windows of about one frequency; no pause shorter than a window is told."""
+    """Joins windows of about one frequency; no pause shorter than a window is reported."""
     spans = list[Span]()
     last_Hz = 0.0
     for window in told:
@@ -106,7 +106,7 @@ def _joined(told: Sequence[Window], ends: Mapping[float, End], band: Band) -> tu
 
 
 def _filled(stretch: list[Window]) -> list[Window]:
-    """Returns a stretch without the windows at its beginning of which the swing fills a part."""
+    """Returns a stretch without the windows at its beginning that the swing fills only in part."""
     widths = [window.line.width for window in stretch]
     first = next((i for i, width in enumerate(widths) if width >= _KEPT * widths[min(_FULL, len(widths) - 1)]), 0)
     return stretch[first:]

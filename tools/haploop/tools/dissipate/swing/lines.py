@@ -12,30 +12,32 @@ from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.dissipate.swing.buzz import FAST, Band
 from haploop.view.look.spectrum import Line, line_at, lobe, main_line
 
-# Of several swings, of which these are the most, each has so much of the variance, and peaks are so many lines apart.
+# Most swings at once; least share of the variance of each, and least distance of peaks, in lines.
 _MOST, _OF_EACH, _APART = 3, 0.1, 2
-# The staircase of an encoder swings by less than a count, here the step that nine of ten exceed.
+# The staircase of an encoder swings by less than a count, here the step that nine of ten exceed; a swing within this
+# many counts may be one.
 COUNTS, _SMALLEST = 2, 10.0
-# Of a swing within the counts their rounding leaves so much of the variance; the staircase of a steady motion has 0.61
-# of its own in its first line.
+# Share of the variance that rounding leaves to a swing within the counts; the staircase of a steady motion has 0.61 of
+# its own in its first line.
 _ROUNDED = 0.68
-# Where its velocity jumps, as at a wall, a slower periodic motion has overtones, at multiples k of its frequency, of no
-# more than this over k^2 of its width. They meet the multiple to so many Hz; of the slowest they are too close.
+# A slower periodic motion whose velocity jumps, as at a wall, has overtones at multiples k of its frequency that are no
+# wider than this over k^2 of its width. They lie within this many Hz of the multiple; those of motions slower than this
+# are too close together.
 _OVERTONE, _APART_HZ, _CLOSE_HZ = 3.5, 0.3, 2.5
-# Where it moves in steps, its overtones have no more than this over k of its width.
+# Where it moves in steps, its overtones are no wider than this over k of its width.
 _JUMPS = 1.5
-# Of a swing beside a drift fewer periods than these in a window, which the drift bends as well, have no frequency.
+# A swing beside a drift with fewer periods in a window than this, which the drift bends as well, has no frequency.
 _FEWEST_PERIODS = 2.5
-# The fit of a sine beside a drift is done where its frequency no longer moves by this share of what a window resolves.
+# The fit of a sine beside a drift is done when its frequency moves by less than this share of what a window resolves.
 _STILL, _STEPS = 1e-3, 12
-# In a window in which the frequency changes, or that lines share, they meet it to so many.
+# In a window in which the frequency changes, or that several lines share, overtones lie within this of the multiple.
 BLURRED_HZ = 0.3 * FAST.resolved_Hz
 # Frequencies of a window, Hz, and amplitudes, m, 0 to peak.
 Spectrum = tuple[Floats, Floats]
 
 
 def swing(x_m: Floats, rate_Hz: float, band: Band = FAST) -> Line | None:
-    """Returns the swing of a window that has a frequency of the band and is felt."""
+    """Returns the swing of a window if its frequency is in the band and it is felt; else None."""
     if len(x_m) <= 3 * band.drift:
         return None
     drift = _drift(len(x_m), band.drift)
@@ -49,23 +51,23 @@ def swing(x_m: Floats, rate_Hz: float, band: Band = FAST) -> Line | None:
 
 
 def within_counts(line: Line, x_m: Floats) -> float:
-    """Returns the count of the positions, m, where the staircase of an encoder may swing as wide as a line; else 0."""
+    """Returns the count of the positions, m, if the staircase of an encoder may swing as wide as a line; else 0."""
     return 0.0 if line.width > (counts_m := _counts_m(x_m)) else counts_m / COUNTS
 
 
 def _beside_drift(line: Line, x_m: Floats, rate_Hz: float, band: Band) -> Line | None:
-    """Returns the line with frequency and width of a sine and a drift that are fitted at once; None without such a fit.
+    """Returns the line with frequency and width of a sine fitted together with a drift; None without such a fit.
 
-    A drift that is taken out by itself first takes part of a slow sine along: of one of three periods in a window,
-    whose drift has a degree of 5, 7 % of its width. The frequency is that of Newton's method (IEEE 1057, the fit of
-    four parameters), under a window of Hann.
+    A drift that is taken out beforehand takes part of a slow sine with it: 7 % of the width of one with three periods
+    in a window, for a drift of degree 5. The frequency is found by Newton's method (IEEE 1057, four-parameter fit),
+    under a Hann window.
     """
     count = len(x_m)
     t, weight = np.linspace(-1.0, 1.0, count), _hann(count)
     drift, periods = _drift(count, band.drift, under_hann=True), line.frequency_Hz * count / rate_Hz
 
     def rest(column: Floats) -> Floats:
-        """Returns what a drift leaves of a column under the window."""
+        """Returns the rest of a column under the window once its drift is taken out."""
         weighted = weight * column
         return weighted - drift @ (drift.T @ weighted)
 
@@ -95,26 +97,26 @@ def _drift(count: int, degree: int, under_hann: bool = False) -> Floats:
 
 
 def _hann(count: int) -> Floats:
-    """Returns weights whose squares are a window of Hann."""
+    """Returns weights whose squares are a Hann window."""
     return np.sin(np.pi * (np.arange(count) + 0.5) / count)
 
 
 def _least_squares(columns: list[Floats], x_m: Floats) -> Floats:
-    """Returns the shares of columns by their normal equations: two sines and the slope of one are far from alike."""
+    """Returns the coefficients of columns by normal equations: two sines and the slope of one are far from alike."""
     rows = np.array(columns)
     return np.asarray(np.linalg.lstsq(rows @ rows.T, rows @ x_m, rcond=None)[0], np.float64)
 
 
 def _counts_m(x_m: Floats) -> float:
-    """Returns how wide the staircase of an encoder may swing."""
+    """Returns how wide the staircase of an encoder may swing, m."""
     steps = np.abs(np.diff(x_m))
     return COUNTS * float(np.percentile(steps[steps > 0.0], _SMALLEST)) if steps.any() else 0.0
 
 
 def fast_rms_m(spectrum: Spectrum) -> float:
-    """Returns the root mean square of what is faster than a hand's motion, under the window of Hann of the spectrum."""
+    """Returns the root mean square of the motion faster than a hand's, under the Hann window of the spectrum."""
     at, height = spectrum
-    # A line of the height h has a variance of h^2 / 2, and that window spreads it over lines with 1.5 times as much; a
+    # A line of height h has a variance of h^2 / 2, and that window spreads it over lines with 1.5 times as much; a
     # slower motion reaches two lines further.
     return float(np.sqrt((height[at > FAST.above_Hz + 2.0 * FAST.resolved_Hz] ** 2).sum() / 3.0))
 
@@ -122,7 +124,7 @@ def fast_rms_m(spectrum: Spectrum) -> float:
 def swings(x_m: Floats, spectrum: Spectrum) -> tuple[Line, ...]:
     """Returns the swings of a window at several frequencies at once, from slow to fast; empty where there are none.
 
-    All are faster than a hand's, wider than the counts are, and felt.
+    All are faster than a hand's, wider than the counts, and felt.
     """
     at, height = spectrum
     power = np.where(at > FAST.above_Hz, height**2, 0.0)
@@ -144,7 +146,7 @@ def swings(x_m: Floats, spectrum: Spectrum) -> tuple[Line, ...]:
 
 
 class Slower(NamedTuple):
-    """A slower motion at one frequency, which may differ so much from window to window, Hz."""
+    """A slower motion at one frequency, which may differ by ``spread_Hz`` from window to window."""
 
     line: Line
     spread_Hz: float = 0.0
@@ -155,7 +157,7 @@ def is_overtone(
 ) -> bool:
     """Tells whether a line of this frequency and width in m may be an overtone of a slower one.
 
-    ``of_jumps``: also of one of which the position itself seems to jump, unless it is so slow that steps stand apart.
+    ``of_jumps``: also of a motion whose position itself seems to jump, unless it is so slow that steps stand apart.
     """
     slower, spread_Hz = of
     order = frequency_Hz / slower.frequency_Hz
@@ -166,7 +168,7 @@ def is_overtone(
 
 
 def overtone_of(line: Line, x_m: Floats, rate_Hz: float, band: Band) -> Line | None:
-    """Returns the line of a window, slower than the band, of which another may be an overtone; None without one."""
+    """Returns the line of a window, slower than the band, of which ``line`` may be an overtone; None without one."""
     slower = main_line(x_m, rate_Hz)
     if not slower or slower.frequency_Hz >= band.above_Hz:
         return None

@@ -12,9 +12,9 @@ from haploop.tools.dissipate.swing.buzz import FAST, Overtone, Several
 from haploop.tools.dissipate.swing.lines import Slower, Spectrum, is_overtone, swings
 from haploop.view.look.spectrum import Line
 
-# So many windows in a row, a quarter of one apart, swing for a second.
+# This many windows in a row, a quarter of a window apart, last a second.
 _LASTS = 5
-# Meanwhile each line keeps this share of its width, so that neither what is struck counts nor what passes by.
+# Meanwhile each line keeps this share of its width, so that neither a swing that was struck nor a passing one counts.
 _KEPT = 0.7
 
 
@@ -31,11 +31,11 @@ class SeveralFinder:
         self._stretches: list[list[_Window]] = [[]]
 
     def part(self) -> None:
-        """Begins anew after a gap."""
+        """Begins a new stretch after a gap."""
         self._stretches.append([])
 
     def look(self, from_s: float, to_s: float, x_m: Floats, spectrum: Spectrum) -> None:
-        """Takes a window, of which the times are those in which it may have swung."""
+        """Takes a window; its times are those between which it may have swung."""
         window = _Window(from_s, to_s, swings(x_m, spectrum))
         last = self._stretches[-1]
         if last and not _is_alike(window.lines, last[-1].lines):
@@ -45,7 +45,7 @@ class SeveralFinder:
             last.append(window)
 
     def found(self, slower: Sequence[Slower]) -> tuple[Several | None, list[Overtone]]:
-        """Returns what lasts longest without decaying, and what was left out as the shape of slower motions."""
+        """Returns the swings that last longest without decaying, and lines left out as the shape of slower motions."""
         told, left_out = list[Several](), list[Overtone]()
         for windows in filter(None, map(_steady, self._stretches)):
             columns = zip(*(window.lines for window in windows), strict=True)
@@ -76,7 +76,7 @@ def _is_alike(some: tuple[Line, ...], others: tuple[Line, ...]) -> bool:
 
 
 def _steady(stretch: list[_Window]) -> list[_Window]:
-    """Returns the windows of a stretch that lie in a row in which every line keeps its width."""
+    """Returns the windows from the first to the last row of ``_LASTS`` in which every line keeps its width."""
     if len(stretch) < _LASTS:
         return []
     widths = np.array([[line.width for line in window.lines] for window in stretch])

@@ -11,12 +11,12 @@ from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.dissipate.swing.course import PLACES, Widths
 from haploop.view.look.spectrum import Line
 
-# The middle quarter of a window by its places, and what is before and after with it.
+# Places in the middle quarter of a window; those up to its end, and those from its beginning on.
 _MIDDLE = slice(3 * PLACES // 8, 5 * PLACES // 8)
 _TO_MIDDLE, _FROM_MIDDLE = slice(_MIDDLE.stop), slice(_MIDDLE.start, PLACES)
-# Of a swing that lasts hardly longer than a window less of it is seen than this share: whether it dies is not told.
+# Of a swing hardly longer than a window, less than this share is seen: whether it dies down is not reported.
 _SEEN = 0.4
-# Of the windows of a swing the first and the last may be empty for about a quarter; the third is full.
+# The first and the last window of a swing may be empty for about a quarter; the third is full.
 THIRD = 2
 
 
@@ -25,8 +25,9 @@ class Window(NamedTuple):
 
     Attributes:
         from_s, to_s: where the swing began if this is the first of its stretch, and ended if it is the last.
-        at_s: where the window begins and how long it is.
-        width_m: the widest, peak to peak: of the sine of the window, or where that changes within of its widest part.
+        at_s: begin and length of the window.
+        width_m: greatest width, peak to peak: that of the window's sine or, where it changes within the window, of its
+            widest part.
     """
 
     from_s: float
@@ -39,7 +40,7 @@ class Window(NamedTuple):
 
 
 class End(NamedTuple):
-    """The end of a part without a gap to which a swing goes on, and its widths in the window before."""
+    """The end of a part without a gap to which a swing continues, and its widths in the window before."""
 
     to_s: float
     at_s: tuple[float, float]
@@ -48,17 +49,17 @@ class End(NamedTuple):
 
 
 def widest_m(line: Line, along: Widths, begins: bool = False, ends: bool = False) -> float:
-    """Returns the width of a window; at its ends, which the swing may not fill, only where a part begins or ends."""
+    """Returns the width of a window; its ends, which a swing may not fill, count only where a part begins or ends."""
     first, last = begins and along.fills(_TO_MIDDLE), ends and along.fills(_FROM_MIDDLE)
     places = slice(0 if first else PLACES // 4, PLACES if last else -PLACES // 4)
     return max(line.width, float(along.width_m[places].max())) if along.varies(places) else line.width
 
 
 def along_m(told: list[Window], ends: Mapping[float, End]) -> tuple[Floats, float]:
-    """Returns the widths of what the swing fills in the order of time, and their standard error, m.
+    """Returns the widths of the part that a swing fills, in the order of time, and their standard error, m.
 
-    Each window tells of its middle quarter; the first of a part of what is before, too, and the last of what comes
-    after. Without those its first two windows and its last two may be filled in part.
+    Each window gives those of its middle quarter; the first of a part also those before, and the last those after. A
+    swing without such a beginning or end may fill its first two or last two windows only in part.
     """
     begins, end = told[0].from_s == told[0].at_s[0] and told[0].widths.fills(_TO_MIDDLE), ends.get(told[-1].to_s)
     some = told[0 if begins else THIRD : len(told) if end else -THIRD] or told[len(told) // 2 :][:1]
@@ -78,6 +79,6 @@ def along_m(told: list[Window], ends: Mapping[float, End]) -> tuple[Floats, floa
 
 
 def is_seen(told: list[Window], width_m: Floats) -> bool:
-    """Tells whether widths of ``along_m`` are those of enough of a swing to say what became of it."""
+    """Tells whether widths of ``along_m`` cover enough of a swing to say how it went."""
     lasts_s = told[-1].to_s - told[0].from_s
     return len(width_m) / PLACES * told[0].at_s[1] >= _SEEN * lasts_s

@@ -1,4 +1,4 @@
-"""An axis of a map: its values, where they stand, how far their cells reach, and what is written along it."""
+"""An axis of a map: its values and their places, how far their cells reach, and what is written along it."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from haploop.tools.render.units import prefix_for
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Units that take a prefix; stiffness, damping and mass stay as scene files have them.
+# Units that take a prefix; stiffness, damping and mass keep the units of scene files.
 _WITH_PREFIX = ("m", "s", "N", "Hz")
-# Steps as different as this are even neither in size nor in ratio; such values stand side by side in even cells.
+# Steps that differ by more than this factor are even neither in size nor in ratio; such values get cells of one width.
 _UNEVEN = 4.0
-# Ratios of a logarithmic axis differ by no more than this, and reach over this range at least.
+# The ratios of a logarithmic axis differ by no more than this, and its values reach over at least this range.
 _LIKE, _RANGE = 1.6, 8.0
-# Letters along an axis, and those left of each word however many there are.
+# Letters along an axis, and those that each word keeps however many words there are.
 _LETTERS, _LEAST_LETTERS = 90, 10
-# A logarithmic axis that reaches over more has numbers at the powers of ten alone.
+# A logarithmic axis that reaches over more than this has numbers only at the powers of ten.
 _DECADES = 1000.0
 # Share of a linear axis below its least value, at least.
 _MARGIN = 0.015
@@ -36,8 +36,8 @@ class Axis:
     """An axis of a sweep as a map shows it.
 
     Attributes:
-        values: ascending; the numbers 0, 1, ... where they stand for ``names``.
-        names: of the values where they are no numbers, in the order of the sweep; else empty.
+        values: ascending; 0, 1, ... where they stand for ``names``.
+        names: names of the values where these are not numbers, in the order of the sweep; else empty.
         planned: the values that the sweep asks for, ascending; a search runs others in between.
     """
 
@@ -64,7 +64,7 @@ class Axis:
         return np.searchsorted(self.values, np.asarray(column, dtype=float))
 
     def word(self, index: int) -> str:
-        """Returns a value as people read it, with its unit."""
+        """Returns a value in words, with its unit."""
         return _short_name(self.names[index]) if self.names else with_unit(self.values[index], self.unit)
 
     @cached_property
@@ -74,11 +74,11 @@ class Axis:
 
     @cached_property
     def factor_and_unit(self) -> tuple[float, str]:
-        """What the values are divided by along a panel, and the unit of what is left."""
+        """The factor by which the values are divided along a panel, and the unit of the result."""
         return with_prefix(self.values, self.unit)
 
     def place(self, values: Iterable[float]) -> np.ndarray:
-        """Returns the coordinates of some values; between the values of an even axis, in proportion."""
+        """Returns the coordinates of some values; on an even axis, others are interpolated linearly."""
         given = np.asarray(list(values), dtype=float)
         if self.scale == "even":
             return np.interp(given, self.values, np.arange(len(self.values), dtype=float))
@@ -90,7 +90,7 @@ class Axis:
 
     @property
     def edges(self) -> np.ndarray:
-        """Ends of the cells, half way to their neighbours, none below 0 where no value is; shape (values + 1,)."""
+        """Ends of the cells, half way to their neighbours, not below 0 where no value is; shape (values + 1,)."""
         at = self.coordinates
         if self.scale == "log":
             return np.exp(_halfway(np.log(at), alone=np.log(3.0)))
@@ -101,7 +101,7 @@ class Axis:
 
     @property
     def label(self) -> str:
-        """The scene's own key, and the unit of the numbers along the axis."""
+        """The key of the scene, and the unit of the numbers along the axis."""
         unit = self.factor_and_unit[1]
         return f"{self.key} ({unit})" if unit else self.key
 
@@ -123,7 +123,7 @@ class Axis:
         else:
             ax.ticklabel_format(axis=which, useOffset=False, style="plain")
         low, high = edges[[0, -1]]
-        if self.scale == "linear":  # what is marked at the end of a cell has room
+        if self.scale == "linear":  # so that a mark at the end of a cell has room
             low = min(low, self.coordinates[0] - _MARGIN * (high - low))
         ax.set(**{f"{which}lim": (low, high)})
         ax.tick_params(axis=which, labelsize=SMALL, colors=GREY, labelcolor=INK if label else "none")
@@ -134,7 +134,7 @@ class Axis:
             spine.set_color(FAINT)
 
     def _names(self) -> tuple[list[float], list[str]]:
-        """Returns where words stand along an even axis, twelve at most, and the words, cut to what has room."""
+        """Returns the places of words along an even axis, at most twelve, and the words, cut to fit."""
         factor, _ = self.factor_and_unit
         words = [self.word(i) if self.names else short(value / factor) for i, value in enumerate(self.values)]
         every, most = -(-len(words) // 12), max(_LEAST_LETTERS, _LETTERS // len(words))
@@ -143,7 +143,7 @@ class Axis:
 
 
 def with_prefix(values: Iterable[float], unit: str) -> tuple[float, str]:
-    """Returns the factor that suits some values, and the unit of what is left of them."""
+    """Returns the factor that suits some values, and the unit of the values divided by it."""
     factor, letter = prefix_for(values) if unit in _WITH_PREFIX else (1.0, "")
     return factor, f"{letter}{unit}"
 
@@ -154,19 +154,19 @@ def with_unit(value: float, unit: str) -> str:
 
 
 def short(value: float) -> str:
-    """Returns four digits or more, as many as a number has before its point."""
+    """Returns a number with four digits, or with as many as it has before its point."""
     return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.7g}"
 
 
 def _name(value: Any) -> str:
-    """Returns a value that is no number as the table has it: text as it is, all else as TOML writes it."""
+    """Returns a value that is no number as the table has it: text unchanged, all else as TOML writes it."""
     if isinstance(value, str):
         return value
     return inline(bool(value) if isinstance(value, np.bool_) else value)
 
 
 def _short_name(name: str) -> str:
-    """Returns a list of elements without its punctuation, ``"damping 0.8 + brake 0.1"``; any other name as it is."""
+    """Returns a list of elements without its punctuation, ``"damping 0.8 + brake 0.1"``; any other name unchanged."""
     if not name.startswith("["):
         return name
     try:

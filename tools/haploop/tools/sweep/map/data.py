@@ -1,4 +1,4 @@
-"""The data of a map: the verdict of every cell over all seeds, and which cells make a panel."""
+"""The data of a map: the verdict of every cell over all seeds, and the cells of each panel."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ Columns = Mapping[str, Any]
 
 
 class Verdict(IntEnum):
-    """Verdicts, the worse later: of several seeds a cell shows the worst.
+    """Verdicts, the worse later: a cell with several seeds shows the worst.
 
-    A failed run says nothing, a swinging one that it swings.
+    A failed run says nothing, a swinging one says that it swings.
     """
 
     STEADY, NO_CONTACT, FAILED, UNDECIDED, LIMIT_CYCLE, GROWING, DIVERGED = range(7)
@@ -47,7 +47,7 @@ class Cells:
         least_m: the least swing among all seeds.
         agree, seeds: how many seeds came to that verdict, and how many ran.
         row: a row of the table with that verdict; -1 for none.
-        rests_on: whether it is steady, and a run of it rests on something that is told beside.
+        rests_on: whether the cell is steady, and the verdict of one of its runs has a proviso.
     """
 
     verdict: np.ndarray
@@ -59,14 +59,14 @@ class Cells:
     rests_on: np.ndarray
 
     def count(self) -> dict[int, int]:
-        """Counts the cells of each verdict that any came to, the mildest first."""
+        """Counts the cells of each verdict that occurs, the mildest first."""
         numbers, counts = np.unique(self.verdict[self.verdict != NOT_RUN], return_counts=True)
         return dict(zip(numbers.tolist(), counts.tolist(), strict=True))
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Numbers of the axes: of those along x and y of a panel (y is None where the amplitude is), and of the others."""
+    """Numbers of the axes along x and y of a panel (y is None where it shows the amplitude), and of the others."""
 
     x: int
     y: int | None
@@ -74,7 +74,7 @@ class Layout:
 
     @classmethod
     def from_axes(cls, axes: Sequence[Axis]) -> Layout:
-        """Lays numbers along the map, the wall's stiffness upwards; names, or the shortest of three, make panels."""
+        """Puts numeric axes along the map, the wall's stiffness upwards; names, or the shortest of three, make panels."""
         numeric = [number for number, axis in enumerate(axes) if not axis.names]
         if len(numeric) == 3:
             free = [number for number in numeric if axes[number].key != STIFFNESS]
@@ -90,7 +90,7 @@ class Layout:
         return math.prod(len(axes[number].values) for number in self.others)
 
     def panels(self, axes: Sequence[Axis], cells: Cells) -> Iterator[Panel]:
-        """Yields the first panels, as many as are drawn."""
+        """Yields as many of the first panels as are drawn."""
         turned = self.y is not None and self.y < self.x
         lengths = [range(len(axes[number].values)) for number in self.others]
         for fixed in islice(product(*lengths), MOST_PANELS):
@@ -106,10 +106,10 @@ class Layout:
 
 @dataclass(frozen=True)
 class Panel:
-    """A part of a sweep whose cells have the values of all axes but those along it in common.
+    """A part of a sweep whose cells share the values of all axes but those along it.
 
     Attributes:
-        titles: these values in words, in full and ever shorter; empty words where there are none.
+        titles: these values in words, in full and ever shorter; empty where there are none.
         cells: of shape (x values, y values) or (x values,).
     """
 
@@ -138,7 +138,7 @@ class MapData:
 
     @property
     def has_edges(self) -> bool:
-        """Tells whether this is a bisecting sweep that is finished, over more than the axis of the search."""
+        """Tells whether this is a finished bisecting sweep with axes beside that of the search."""
         return bool(self.boundary) and len(self.axes) > 1
 
     @property
@@ -169,11 +169,11 @@ class MapData:
 
     @property
     def is_unpushed(self) -> bool:
-        """Tells whether the verdicts are the cheap ones."""
+        """Tells whether the verdicts are the cheap ones, of runs that were not pushed."""
         return self.sweep.get("base", {}).get("run", {}).get("verdict") == "window"
 
     def word(self, verdict: int) -> str:
-        """Returns a verdict in words; where no run was pushed, what its window shows."""
+        """Returns a verdict in words; where no run was pushed, what the window shows."""
         word = VERDICTS[verdict]
         return (OF_WINDOW.get(word, word) if self.is_unpushed else word).replace("-", " ")
 
@@ -182,9 +182,9 @@ class MapData:
         return list(filter(None, str(self.columns.get(PROVISOS, {row: ""})[row] or "").split(JOINS)))
 
     def amplitudes_m(self) -> np.ndarray:
-        """Returns how far every row swings: a limit cycle by what remains of it after a push, where that is recorded.
+        """Returns how far every row swings: for a limit cycle, what remains after a push where that is recorded.
 
-        All else by the oscillation at the end of its run; NaN where it is not known.
+        For all others, the oscillation at the end of the run; NaN where it is not known.
         """
         width_m = self._numbers(WIDTH)
         return np.where((self.verdicts == Verdict.LIMIT_CYCLE) & (width_m > 0.0), width_m, self._numbers(AMPLITUDE))
@@ -195,7 +195,7 @@ class MapData:
 
 
 def verdict_number(word: str | None) -> int:
-    """Returns the place of a verdict in ``VERDICTS``, of a window's that of its like; a run without one failed."""
+    """Returns the place of a verdict in ``VERDICTS``, for a window's that of its like; a run without one failed."""
     word = _LIKE.get(word, word) if word else word
     return VERDICTS.index(word) if word in VERDICTS else Verdict.FAILED
 
@@ -212,7 +212,7 @@ def make_map_data(
     if not len(columns["verdict"]):
         raise FigureError("The sweep has no finished cell yet, so there is nothing to draw.")
     if "bisect" in sweep and not boundary and len(sweep["axes"]) > 1:
-        # Of a search that goes on; what it runs in between is no cell of a map.
+        # The search is not finished; the values that it runs in between are no cells of a map.
         key = sweep["bisect"]["axis"]
         planned = np.flatnonzero(np.isin(np.asarray(columns[key], dtype=float), sweep["axes"][key])).tolist()
         columns = {name: [column[row] for row in planned] for name, column in columns.items()}

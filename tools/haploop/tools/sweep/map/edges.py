@@ -26,10 +26,10 @@ class Edges:
 
     Attributes:
         along: the axis that was bisected, with its planned points.
-        others: the other axes, along x first; none where there is none.
+        others: the other axes, that along x first; empty without any.
         holds: the verdict on the near side, in words.
         rising: whether the search went towards greater values.
-        state: a ``State``; of seeds that differ, that of the seed that holds least far.
+        state: a ``State``; where seeds differ, that of the seed that holds least far.
         nearest: the last value at which the seed that holds least far was seen to hold.
         low, high: the brackets of all seeds together.
         more: how often a seed changed more than once at the planned points.
@@ -64,7 +64,7 @@ def find_edges(data: MapData) -> Edges:
     first, *_, last = data.sweep["axes"][key]
     rising = last >= first
     shape = tuple(len(axis.values) for axis in others)
-    # What holds least far: none, unknown, found, all.
+    # How far a seed holds, the least first: nowhere, unknown, found, everywhere.
     rank = np.full(shape, np.inf)
     state, nearest = np.full(shape, State.UNKNOWN), np.full(shape, math.nan)
     low, high = np.full(shape, math.nan), np.full(shape, math.nan)
@@ -97,7 +97,7 @@ def find_edges(data: MapData) -> Edges:
 
 
 def _places(table: Columns, axes: Sequence[Axis], rows: np.ndarray) -> list[tuple[int, ...]]:
-    """Returns of some rows the indices on the axes, and the seed."""
+    """Returns, for some rows, the indices on the axes and the seed."""
     seeds = table["seed"] if "seed" in table else [0] * len(table[axes[0].key])
     columns = [*(axis.indices(table[axis.key]) for axis in axes), seeds]
     return [tuple(int(column[row]) for column in columns) for row in rows]
@@ -108,9 +108,9 @@ class Answer:
     """The combination that holds furthest.
 
     Attributes:
-        index: its places on the axes it was looked for on.
-        value: up to where it holds.
-        words: what to write beside it, ever shorter.
+        index: its places on the axes that were searched.
+        value: value up to which it holds.
+        words: labels to write beside it, ever shorter.
         open_end: whether nothing beyond was tried with its other values.
     """
 
@@ -121,7 +121,7 @@ class Answer:
 
 
 def furthest(edges: Edges) -> Answer | None:
-    """Finds what holds furthest from where the search begins; None where no boundary was found and nothing holds."""
+    """Finds the combination that holds furthest from where the search begins; None where no boundary was found."""
     if (throughout := np.argwhere(edges.state == State.ALL_HOLD)).size:
         end = -1 if edges.rising else 0
         words = f"{edges.holds} {edges.reaches} {edges.along.word(end)} and perhaps beyond"
@@ -138,11 +138,11 @@ def furthest(edges: Edges) -> Answer | None:
 
 
 def _towards(value: float, *, down: bool) -> float:
-    """Returns a value with four digits, none of them beyond it."""
+    """Returns a value rounded to four digits so that it does not go beyond the value itself."""
     if not value:
         return value
     step = 10.0 ** (math.floor(math.log10(abs(value))) - 3)
-    # What four digits hold already stays, however it is rounded.
+    # A value of no more than four digits stays the same in spite of rounding.
     steps = math.floor(value / step + 1e-6) if down else math.ceil(value / step - 1e-6)
     return float(f"{steps * step:.4g}")
 
@@ -150,8 +150,8 @@ def _towards(value: float, *, down: bool) -> float:
 def stiffest_steady(axes: Sequence[Axis], cells: Cells, steady_word: str = "steady") -> Answer | None:
     """Finds the stiffest steady wall below which every wall that was tried with the same other values is steady, too.
 
-    Where several cells share it, the one in the middle of them is taken. None where the wall was not swept, or no
-    softest wall is steady.
+    Where several cells share it, the middle one of them is taken. None where the wall was not swept, or no softest wall
+    is steady.
     """
     keys = [axis.key for axis in axes]
     if STIFFNESS not in keys:

@@ -1,4 +1,4 @@
-"""The figure of a sweep: a map of its cells in panels, or the boundaries that a search found, line by line."""
+"""The figure of a sweep: a map of its cells in panels, or the boundaries that a search found, in lines."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ _SIDES: tuple[Literal["x", "y"], ...] = ("x", "y")
 MOST_LINES = 8
 _COLOURS = (WALL, *ELEMENTS, "#332288")
 _MARKERS = "osD^vP*X"
-# Signs of several lines at an edge stand above one another; of the height of a panel, what one of them takes.
+# Signs of several lines at an edge are stacked; height of one of them, in points and as a share of the panel's height.
 _STACK_PT, _STRIP = 9.0, 0.024
 
 
 def draw_map(directory: Path, target: Path | None = None) -> Path:
-    """Draws the map of a sweep, finished or not, into a file, and returns that.
+    """Draws the map of a sweep, finished or not, into a file, and returns the file.
 
     Args:
         target: file of the figure, in the format of its suffix; ``figure.png`` in the directory when None.
@@ -67,7 +67,7 @@ def draw_map(directory: Path, target: Path | None = None) -> Path:
 
 
 def make_figure(data: MapData) -> Figure:
-    """Makes the map of a sweep's cells, a panel for each combination of the axes that do not lie along it.
+    """Makes the map of a sweep's cells, with a panel for each combination of the axes that do not lie along it.
 
     Raises FigureError where matplotlib is missing.
     """
@@ -113,8 +113,8 @@ def make_figure(data: MapData) -> Figure:
 def bisect_figure(data: MapData) -> Figure:
     """Makes the figure of the boundaries of a finished bisecting sweep with two or three axes.
 
-    How far the near side reaches over the first of the other axes, a line for every value of the second. Raises
-    FigureError where matplotlib is missing.
+    It shows how far the near side reaches over the first of the other axes, with a line for every value of the second.
+    Raises FigureError where matplotlib is missing.
     """
     from matplotlib.lines import Line2D
 
@@ -191,7 +191,7 @@ def _draw_boundary(ax: Axes, edges: Edges, part: tuple[Any, ...], number: int, c
 
 
 def _make_room(ax: Axes, y: Axis, edges: Edges, lines: int) -> None:
-    """Adds a strip at either end for the signs of combinations without a boundary, one line's above the other's."""
+    """Adds strips at the ends for the signs of combinations without a boundary, those of several lines stacked."""
     states = {*edges.state.flat}
     none, throughout = bool({State.NONE_HOLDS, State.UNKNOWN} & states), State.ALL_HOLD in states
     below, above = (none, throughout) if edges.rising else (throughout, none)
@@ -206,7 +206,7 @@ def _make_room(ax: Axes, y: Axis, edges: Edges, lines: int) -> None:
 
 
 def _fill(ax: Axes, x: Axis, y: Axis, edges: Edges) -> None:
-    """Fills what holds: from where the search begins to the boundary, or to the end where none was found."""
+    """Fills the area that holds: from where the search begins to the boundary, or to the end where none was found."""
     near, far = y.edges[[0, -1]] if edges.rising else y.edges[[-1, 0]]
     borders = x.edges
     for i in np.flatnonzero(np.isin(edges.state, (State.FOUND, State.ALL_HOLD))):

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 EXACT = "ρ(M) = 1"
 _MEANING = {"passivity": "passive, whatever passive hand holds it", "stability": "stable with the scene's own hand"}
 _MOST_LOG = 50.0
-# Of a straight line, so that its name finds room.
+# Points of a straight line, so that there is room for its name.
 _POINTS = 41
 _DASHES = ((5, 2), (2, 1.5), (7, 2, 1.5, 2), (1, 1), (9, 3), (4, 1.5, 1, 1.5, 1, 1.5))
 _COLOURS = ("#0B5FA5", "#7A1FA2", "#00664A", "#5B3A29", "#8A0F3C", "#3C3C8F")
@@ -39,7 +39,7 @@ class MapLine:
     """A named line over a map.
 
     Attributes:
-        words: what it says, and its source.
+        words: its meaning and source.
         pieces: points of each, values of the axes in SI, shape (n, axes).
     """
 
@@ -50,7 +50,7 @@ class MapLine:
 
 @dataclass
 class PanelLines:
-    """The lines over a panel, and their pieces as drawn by name; ``why_none`` where there is no exact limit."""
+    """The lines over a panel, and their pieces as drawn, by name; ``why_none``: why there is no exact limit."""
 
     lines: list[MapLine] = field(default_factory=list)
     why_none: str = ""
@@ -58,7 +58,7 @@ class PanelLines:
 
 
 def find_lines(texts: Iterable[str | None], axes: Sequence[Axis], bounds: bool = True) -> PanelLines:
-    """Finds the lines for the first scene there is among some of a panel, as TOML; none over names."""
+    """Finds the lines for the first scene among some of a panel, given as TOML; none over an axis of names."""
     text = next((text for text in texts if text), None)
     if text is None:
         return PanelLines(why_none="none of its cells has a scene")
@@ -77,10 +77,10 @@ def find_lines(texts: Iterable[str | None], axes: Sequence[Axis], bounds: bool =
 
 
 def exact_limit(plane: Plane) -> MapLine:
-    """Finds where rho(M) = 1 for the linear loop; without lines where it grows nowhere or everywhere.
+    """Finds where rho(M) = 1 for the linear loop; no lines where it grows nowhere or everywhere.
 
     Raises:
-        NotLinear: the loop of some place is no linear map; the message names what makes it none, in a few words.
+        NotLinear: the loop at some place is not a linear map; the message names the reason in a few words.
     """
     scenes = plane.own_scenes()
     if any(scene.wall is None for scene in scenes):
@@ -94,7 +94,7 @@ def exact_limit(plane: Plane) -> MapLine:
 
 
 def bound_lines(plane: Plane) -> list[MapLine]:
-    """Finds for every bound that applies at some place of a panel the line on which the wall is as stiff as it allows.
+    """Finds, for every bound that applies somewhere in a panel, the line on which the wall is as stiff as it allows.
 
     A bound that applies but allows no wall of the panel, or every one, has no lines.
     """
@@ -104,7 +104,7 @@ def bound_lines(plane: Plane) -> list[MapLine]:
     applied: set[str] = set()
 
     def stiffness_over(place: int) -> Level:
-        """Makes the logarithm of the wall's stiffness over what a bound allows; NaN where it does not apply."""
+        """Makes the logarithm of the wall's stiffness over that which a bound allows; NaN where it does not apply."""
 
         def level(x: float, y: float) -> float:
             bound, stiffness = bounds(x, y)[place], plane.stiffness(x, y)
@@ -132,7 +132,7 @@ class LineStyle(TypedDict):
 
 
 def line_styles(names: Sequence[str]) -> dict[str, LineStyle]:
-    """Returns the look of every line by its name, each with dashes of its own; the exact limit is solid and black."""
+    """Returns the look of every line by its name, each with different dashes; the exact limit is solid and black."""
     styles: dict[str, LineStyle] = {EXACT: {"color": INK, "linewidth": 2.0}} if EXACT in names else {}
     for number, name in enumerate(name for name in names if name != EXACT):
         turn = number % len(_COLOURS)
@@ -141,7 +141,7 @@ def line_styles(names: Sequence[str]) -> dict[str, LineStyle]:
 
 
 def line_signs(styles: Mapping[str, LineStyle], panels: Iterable[PanelLines]) -> list[Artist]:
-    """Makes the sign of every line, labelled with its name and what it says."""
+    """Makes the sign of every line, labelled with its name and meaning."""
     from matplotlib.lines import Line2D
 
     words = {line.name: line.words for panel in panels for line in panel.lines}
@@ -151,7 +151,7 @@ def line_signs(styles: Mapping[str, LineStyle], panels: Iterable[PanelLines]) ->
 def draw_line(ax: Axes, line: MapLine, axes: Sequence[Axis], style: LineStyle) -> list[np.ndarray]:
     """Draws all pieces of a line, and returns them in the coordinates of the panel.
 
-    A piece that is one value of the only axis stands upright.
+    A piece that is one value of the only axis is drawn as a vertical line.
     """
     from matplotlib.patheffects import Normal, withStroke
 
@@ -180,7 +180,7 @@ def draw_line(ax: Axes, line: MapLine, axes: Sequence[Axis], style: LineStyle) -
 
 
 def _across(place: np.ndarray, axes: Sequence[Axis]) -> np.ndarray:
-    """Returns a point as a line across the only cell there is along an axis."""
+    """Returns a point as a line across the only cell along an axis."""
     points = np.tile(place, (_POINTS, 1))
     for number, axis in enumerate(axes):
         if len(axis.values) == 1:
@@ -189,9 +189,9 @@ def _across(place: np.ndarray, axes: Sequence[Axis]) -> np.ndarray:
 
 
 class Star(NamedTuple):
-    """The answer of a panel: where its star stands, in the coordinates of the panel, and its label, ever shorter.
+    """The answer of a panel: the place of its star, in the coordinates of the panel, and its label, ever shorter.
 
-    ``off`` are corners of the areas of which it does not speak, which the label keeps off.
+    ``off`` are corners of the areas to which it does not apply, which the label keeps off.
     """
 
     x: float
@@ -205,7 +205,7 @@ def write_names(
 ) -> None:
     """Draws the star and writes its label, and each line's name on its longest piece where the lines are of one panel.
 
-    Call when the panel has its place; what has no room is not written.
+    Call when the panel's place is fixed; a label without room is not written.
     """
     room = LabelRoom(ax)
     room.avoid_texts(ax.texts)

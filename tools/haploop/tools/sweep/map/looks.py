@@ -1,4 +1,4 @@
-"""The looks of verdicts, told apart without colour as well, and of amplitudes."""
+"""The looks of verdicts, which can be told apart without colour as well, and of amplitudes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Look(NamedTuple):
-    """Fill of a cell, hatching and its colour, marker of a point and its colour."""
+    """The fill of a cell, its hatching and the hatching's colour, and the marker of a point and its colour."""
 
     fill: str
     hatch: str
@@ -38,18 +38,18 @@ LOOKS: dict[int, Look] = {
     Verdict.GROWING: Look("#7A2430", "+++", "#D0A0A8", "v", COLOURS["growing"]),
     Verdict.DIVERGED: Look("#3B0F1E", "///", "#A58090", "^", COLOURS["diverged"]),
 }
-# Of cells that are steady with a proviso.
+# The look of cells that are steady with a proviso.
 PROVISO = Look(LOOKS[Verdict.STEADY].fill, "//", "#A9CDDD", "o", COLOURS["steady"])
-# Of amplitudes that have colours of their own, the least over the greatest.
+# Least over greatest of the amplitudes that have different colours.
 _RANGE = 1e-5
 
 
 def verdict_signs(
     counts: Mapping[int, int], word: Callable[[int], str], as_points: bool, with_proviso: int = 0
 ) -> list[Artist]:
-    """Makes the sign of every verdict, a point or a cell, labelled with its word and how many cells came to it.
+    """Makes the sign of every verdict, a point or a cell, labelled with its word and the number of its cells.
 
-    ``with_proviso`` of the steady ones have a sign of their own where cells are shown.
+    The steady cells ``with_proviso`` have a sign of their own where cells are shown.
     """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -77,7 +77,7 @@ def amplitude_colours() -> Colormap:
 
 
 def amplitude_scale(amplitudes_m: np.ndarray) -> LogNorm | None:
-    """Makes one logarithmic scale for some amplitudes, a great range cut at its lower end; None where none is known."""
+    """Makes one logarithmic scale for some amplitudes, a large range cut at its lower end; None where none is known."""
     from matplotlib.colors import LogNorm
 
     known = amplitudes_m[np.isfinite(amplitudes_m) & (amplitudes_m > 0.0)]
@@ -88,7 +88,7 @@ def amplitude_scale(amplitudes_m: np.ndarray) -> LogNorm | None:
 
 
 def metres_along(axis: MatplotlibAxis, ratio: float, from_m: float = 0.0) -> None:
-    """Puts numbers with their own unit along a logarithmic axis of metres that reaches over a ratio, from one on."""
+    """Puts numbers with suitable units along a logarithmic axis of metres that reaches over a ratio, from one on."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     few = {60.0: (1,), 12.0: (1, 3), 3.0: (1, 2, 5), 0.0: (1, 2, 3, 4, 6, 8)}

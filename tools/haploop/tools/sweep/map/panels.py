@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.colors import LogNorm
 
-# Cells smaller than this have no room for a count, those smaller than the other not even for a dot.
+# Cells smaller than the first have no room for a count, those smaller than the second not even for a dot.
 _COUNT_PX, _DOT_PX = (26.0, 15.0), 4.0
 
 
@@ -44,7 +44,7 @@ def draw_cells(ax: Axes, x: Axis, y: Axis, cells: Cells, scale: LogNorm | None) 
 
 
 def _hatch(ax: Axes, edges: tuple[np.ndarray, np.ndarray], where: np.ndarray, look: Look, gid: str) -> None:
-    """Draws one hatched patch of all cells of a verdict, by unbroken runs in a row, so that the hatching runs on."""
+    """Draws one hatched patch of all cells of a verdict, from unbroken runs in rows, so that the hatching is continuous."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
@@ -84,9 +84,9 @@ def _outline(ax: Axes, edges: tuple[np.ndarray, np.ndarray], verdict: np.ndarray
 
 
 def mark_disagreement(ax: Axes, x: Axis, y: Axis, cells: Cells) -> None:
-    """Marks where not all seeds came to the verdict shown: by their count, or by a dot in a small cell.
+    """Marks cells in which not all seeds came to the verdict shown: by their count, or by a dot in a small cell.
 
-    Call when the panel has its place and limits.
+    Call when the place and limits of the panel are fixed.
     """
     from matplotlib.patheffects import withStroke
 
@@ -111,7 +111,7 @@ def mark_disagreement(ax: Axes, x: Axis, y: Axis, cells: Cells) -> None:
         )  # fmt: skip
 
 
-# Room below the least and above the greatest amplitude, for cells that have none.
+# Room below the least and above the greatest amplitude, as factors, for cells without one.
 _BELOW, _ABOVE = 3.0, 6.0
 
 
@@ -120,7 +120,7 @@ class SwingScale:
 
     Attributes:
         least: the least swing that has a number along the scale.
-        floor: where those lie that swing less, or not at all, below ``least``; None where there are none.
+        floor: place, below ``least``, of cells that swing less or not at all; None where there are none.
     """
 
     def __init__(self, cells: Cells) -> None:
@@ -136,7 +136,7 @@ class SwingScale:
         self.shelf = self.high / np.sqrt(_ABOVE)
 
     def place(self, amplitudes_m: np.ndarray) -> np.ndarray:
-        """Returns coordinates of amplitudes: none at all on the floor, unknown and boundless ones on the shelf."""
+        """Returns coordinates of amplitudes: those below ``least`` on the floor, unknown and infinite ones on the shelf."""
         at = np.where(amplitudes_m < self.least, self.floor or self.least, amplitudes_m)
         return np.where(np.isfinite(at), at, self.shelf)
 

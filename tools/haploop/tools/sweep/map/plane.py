@@ -17,8 +17,8 @@ from haploop.protocol.ticks import DELAY, TimebaseError
 from haploop.tools.sweep.map.axis import Axis
 from haploop.tools.sweep.map.data import STIFFNESS
 
-# Points along an axis between which a line is looked for; windows narrower than that are not seen. Few where every
-# point takes a map of its own.
+# Points along an axis between which a line is looked for; areas narrower than their distance are not seen. Fewer where
+# every point takes a one-tick map of its own.
 POINTS, FEW_POINTS = 41, 21
 Level = Callable[[float, float], float]
 T = TypeVar("T")
@@ -26,10 +26,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Plane:
-    """All scenes of a panel, those between its cells included.
+    """All scenes of a panel, including those between its cells.
 
     Attributes:
-        axes: x first; where there is one alone, y is of no account.
+        axes: x first; with only one axis, y has no effect.
     """
 
     scene: Scene
@@ -44,7 +44,7 @@ class Plane:
         return scene
 
     def once_for_all_stiffnesses(self, make: Callable[[Scene], T]) -> Callable[[float, float], T]:
-        """Makes the function from a place to what is made of its scene, of those that differ in stiffness only once."""
+        """Makes the function from a place to the result of ``make``; scenes that differ only in stiffness share one."""
         made: dict[tuple[float, ...], T] = {}
 
         def at(x: float, y: float) -> T:
@@ -61,17 +61,17 @@ class Plane:
         return here[0] if here else value_at(self.scene, STIFFNESS)
 
     def own_scenes(self) -> list[Scene]:
-        """Returns the scenes along the axes' own values, one axis after the other: all that may differ in kind."""
+        """Returns the scenes at the values of the axes, one axis after the other: all that may differ in kind."""
         ends = [axis.values for axis in self.axes] + [np.zeros(1)]
         along_x = [self.at(x, ends[1][0]) for x in ends[0]]
         return along_x + [self.at(ends[0][-1], y) for y in ends[1]]
 
     def zero_lines(self, level: Level, whole_ticks: bool = False) -> list[np.ndarray]:
-        """Finds where a function of the axes' values is zero; points of each line in SI, shape (n, axes).
+        """Finds where a function of the axes' values is zero; points of each line in SI units, shape (n, axes).
 
         Args:
-            level: NaN where there is none.
-            whole_ticks: whether it is only asked for delays of whole control ticks; else of whole plant steps.
+            level: the function; NaN where it has no value.
+            whole_ticks: whether it is evaluated only at delays of whole control ticks; else of whole plant steps.
         """
 
         @cache
@@ -87,7 +87,7 @@ class Plane:
         return [line[:, : len(self.axes)] for line in zero_lines(between, xs, ys, (x_exact, y_exact))]
 
     def _grid(self, which: int) -> tuple[np.ndarray, bool]:
-        """Returns values along an axis, and whether those between them are scenes as well."""
+        """Returns values along an axis, and whether values between them make scenes as well."""
         if which >= len(self.axes):
             return np.zeros(1), False
         axis = self.axes[which]
@@ -116,7 +116,7 @@ class Plane:
 
 
 def _fine_values(axis: Axis, points: int) -> np.ndarray:
-    """Returns about so many values along an axis between its cells' outermost edges, even in its scale."""
+    """Returns about ``points`` values along an axis between its cells' outermost edges, even in its scale."""
     values = axis.values
     if len(values) < 2:
         return values
@@ -134,12 +134,13 @@ def _fine_values(axis: Axis, points: int) -> np.ndarray:
 def zero_lines(level: Level, xs: np.ndarray, ys: np.ndarray, exact: tuple[bool, bool]) -> list[np.ndarray]:
     """Returns the lines on which ``level`` is zero.
 
-    A contour of the grid meets its edges where interpolation has it; along the edge, Brent's method puts the point
-    where the level itself is zero, so that only the way from one edge to the next is a guess.
+    A contour meets the edges of the grid at interpolated points; along each edge, Brent's method moves the point to
+    where the level itself is zero, so that only the course from one edge to the next is a guess.
 
     Args:
-        level: of x and y, whose grid is ascending; NaN where there is none.
-        exact: whether a point may be moved along x, along y; not where values between the grid's are not allowed.
+        level: function of x and y, whose grid is ascending; NaN where it has no value.
+        exact: whether a point may be moved along x, and along y; not where values between those of the grid are not
+            allowed.
 
     Returns:
         Points of each line, shape (n, 2).
@@ -163,7 +164,7 @@ Grid = tuple[np.ndarray, np.ndarray]
 
 
 def _at_scenes(places: np.ndarray, exact: tuple[bool, bool]) -> np.ndarray:
-    """Returns the places that lie on the values of an axis that has no others between; all where none do."""
+    """Returns the places that lie on values of any axis without values in between; all places where none do."""
     whole = np.abs(places - np.rint(places)) == 0.0
     kept = places[(whole | np.array(exact)).all(axis=1)]
     return kept if len(kept) else places
@@ -182,7 +183,7 @@ def _along_one(level: Level, heights: np.ndarray, grid: Grid, exact: tuple[bool,
 def _exact(level: Level, place: np.ndarray, grid: Grid, exact: tuple[bool, bool]) -> np.ndarray:
     """Returns the zero on the edge of the grid on which ``place`` (counted in grid lines) lies, by Brent's method.
 
-    Where the ends of the edge do not enclose one, that is the place itself.
+    Where the ends of the edge do not enclose a zero, returns the place itself.
     """
     from scipy.optimize import brentq
 

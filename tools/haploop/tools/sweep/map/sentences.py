@@ -14,10 +14,10 @@ from haploop.tools.sweep.map.data import NOT_RUN, STIFFNESS, WIDTH, Cells, Layou
 from haploop.tools.sweep.map.edges import Answer, Edges, State, stiffest_steady
 from haploop.tools.sweep.map.lines import PanelLines
 
-# What fits into the line below the title; the base scene's title is cut short before anything else is.
+# Letters that fit into the line below the title; the base scene's title is cut before anything else is.
 _BETWEEN, _LETTERS, _LEAST_LETTERS = "   ·   ", 185, 12
 _REASON_LETTERS = 160
-# Of pushed runs, and of those of which the window alone was looked at.
+# For pushed runs, and for those of which only the window was looked at.
 _NONE = (
     "No wall is steady from the softest one on that was tried.",
     "There is no wall, from the softest one on that was tried, on which no swing was seen.",
@@ -84,7 +84,7 @@ def _answer(data: MapData, cells: Cells) -> str:
 
 
 def _provisos(data: MapData) -> str:
-    """Returns how many steady runs rest on what."""
+    """Returns how many steady runs rest on each proviso."""
     counts = Counter(
         proviso for row in np.flatnonzero(data.verdicts == Verdict.STEADY).tolist() for proviso in data.provisos(row)
     )
@@ -93,7 +93,7 @@ def _provisos(data: MapData) -> str:
 
 
 def _place(at: Iterable[tuple[Axis, int]]) -> str:
-    """Returns values of some axes: ``" at device.mass 0.1 kg"``; nothing for no axis."""
+    """Returns values of some axes: ``" at device.mass 0.1 kg"``; empty without any axis."""
     words = [f"{axis.key} {axis.word(index)}" for axis, index in at]
     return f" at {', '.join(words)}" if words else ""
 

@@ -16,19 +16,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from matplotlib.text import Text
 
-# A screen's 1280 pixels wide.
+# As wide as 1280 pixels of a screen.
 WIDTH_IN, _SIDE_IN, _HEADER_IN = 11.64, 2.75, 0.8
-# Height of a row of panels, by how many rows there are.
+# Height of a row of panels, by the number of rows.
 _HEIGHTS_IN = {1: 6.0, 2: 3.6}
 _LEAST_HEIGHT_IN = 2.7
 # How far a panel's title may reach into the gap beside it, as a multiple of the panel's width.
 _BEYOND = 1.05
-# Of the column: the room above it and between its parts, the height of the scale of amplitudes; letters of a line.
+# Of the column: the room above it and between its parts, the height of the amplitude scale, the letters of a line.
 _ABOVE_IN, _GAP_IN, _BAR_IN, _LETTERS = 0.36, 0.16, 0.14, 44
 
 
 class Sheet:
-    """A figure with a header, so many panels in rows, and a column beside them; FigureError without matplotlib."""
+    """A figure with a header, panels in rows, and a column beside them; FigureError without matplotlib."""
 
     def __init__(self, panels: int, title: str, line: str) -> None:
         self.columns = panels if panels <= 3 else 2 if panels == 4 else 3 if panels <= 9 else 4
@@ -55,7 +55,7 @@ class Sheet:
 
 
 class Column:
-    """Writes beside a map from the top down, in a part of the figure that is so high."""
+    """Writes beside a map from the top down, in a part of the figure ``height_in`` inches high."""
 
     def __init__(self, side: SubFigure, height_in: float) -> None:
         self._side, self._height_in = side, height_in
@@ -80,7 +80,7 @@ class Column:
         self._go_below(made)
 
     def amplitudes(self, scale: LogNorm, word: str) -> None:
-        """Draws the colours of what swings, by its word."""
+        """Draws the colour scale of the swings, named by the word for their verdict."""
         from matplotlib.cm import ScalarMappable
 
         self._write(f"{word}: swing, peak to peak", TEXT, INK)
@@ -107,14 +107,14 @@ class Column:
 
 
 def _write(header: SubFigure, words: str, y: float, size: float, colour: str, gid: str, bold: bool = False) -> None:
-    """Writes one line, smaller if it has to be, cut off if that does not do."""
+    """Writes one line, smaller if necessary, and cut off if that does not suffice."""
     weight = "bold" if bold else "normal"
     text = header.text(0.008, y, words, fontsize=size, color=colour, va="center", fontweight=weight, gid=gid)
     fit_text(text, header.figure.bbox.width * 0.984)
 
 
 def panel_title(ax: Axes, words: str) -> Text:
-    """Writes the title of a panel, which its cells have in common."""
+    """Writes the title of a panel, which all its cells share."""
     return ax.set_title(words, loc="left", fontsize=TEXT, fontweight="bold", color=INK)
 
 
