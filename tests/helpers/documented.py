@@ -6,7 +6,7 @@ import re
 import shlex
 from typing import NamedTuple
 
-# Commands that go to a run which is going on.
+# Commands to a run in progress.
 LIVE = ("status", "swap", "set", "undo", "pause", "resume", "step", "pace", "attach", "stop")
 
 
@@ -28,7 +28,7 @@ def blocks(text: str) -> list[Block]:
 
 
 def lines_of(block: Block) -> list[str]:
-    """Lines that begin with ``haploop``, after a prompt or without; those that go on with a backslash in one."""
+    """Lines that begin with ``haploop``, after a prompt or without; lines continued by a backslash are joined."""
     lines = [line.removeprefix("$ ") for line in block.text.replace("\\\n", " ").splitlines()]
     return [line for line in lines if line.startswith("haploop ")] if block.is_typed else []
 
@@ -39,7 +39,7 @@ def command_lines(text: str) -> list[str]:
 
 
 def commands(block: Block) -> list[list[str]]:
-    """The words of each command after ``haploop``: comments are left out, and `pause | resume` is two of them."""
+    """The words of each command after ``haploop``; comments are left out, and `pause | resume` is two commands."""
     found = []
     for line in lines_of(block):
         alternatives = re.split(r" \| ", re.split(r"   #", line)[0].removeprefix("haploop "))

@@ -10,7 +10,7 @@ from rich.console import Console
 
 
 def artists(figure: Any, name: str) -> list[Any]:
-    """Everything drawn under a name, in the order of drawing; no ticks, which would be made for being looked at."""
+    """Everything drawn under a name, in the order of drawing; no ticks, which looking at them would create."""
     within = (
         [] if isinstance(figure, Axis) else [found for one in figure.get_children() for found in artists(one, name)]
     )
@@ -35,5 +35,5 @@ def words(figure: Any, name: str) -> list[str]:
 
 
 def axes(figure: Any) -> list[Any]:
-    """The axes that are on, of all parts of a figure."""
+    """The axes of all parts of a figure that are switched on."""
     return [ax for part in figure.subfigs for ax in part.axes if ax.axison]

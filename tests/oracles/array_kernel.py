@@ -21,7 +21,7 @@ FIGURES = 9
 
 @numba.njit(cache=False, fastmath=False)
 def _judge(trace, steps, measured, totals, ticks, position, swing, out):  # pragma: no cover
-    """Width, crossings and growth of the swings about the trend line, and what the ticks in contact show."""
+    """Width, crossings and growth of the swings about the trend line, and the measures of the ticks in contact."""
     kept, rows = min(steps, len(trace) - 1) + 1, min(ticks, len(measured))
     first = (steps + 1 - kept) % len(trace)
     low, high, mean = np.inf, -np.inf, 0.0
@@ -147,7 +147,7 @@ def _loops(  # pragma: no cover
 
 
 def run_kernel(scenes: list[Scene], energy: bool) -> np.ndarray:
-    """Extremes, what the window shows and ``BOOKS``, as in a summary; shape (scenes, FIGURES + books)."""
+    """Extremes, measures of the window and ``BOOKS``, as in a summary; shape (scenes, FIGURES + books)."""
     first = scenes[0]
     time = Timebase.from_scene(first)
     m, n = Mechanics.from_scene(first), time.steps_per_tick

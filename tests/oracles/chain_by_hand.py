@@ -1,7 +1,7 @@
-"""Plant telemetry of a chain of bodies made by hand: absolute coordinates, scipy's expm, friction switched at will.
+"""Plant telemetry of a chain of bodies made by hand: absolute coordinates, scipy's expm, arbitrarily switched friction.
 
 The masses, springs and dampers are those of the reference (``effects_reference.Bodies``); every energy is integrated by
-Gauss and Legendre along the motion. Nothing is shared with haploop but the scene.
+Gauss-Legendre quadrature along the motion. Only the scene is shared with haploop.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ RATE, STEPS = 2_000, 100
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
 MOST_N = 1.5
 TAU = {"kind": "sine", "amplitude": 1.5, "frequency": 43.0}
-# Makes lengths comparable to velocities, 1/s.
+# Factor that makes lengths comparable to velocities, 1/s.
 _LENGTHS = 500.0
 
 
 def chain_scene(rng: np.random.Generator, effects: str) -> Scene:
-    """A scene with some of cable, grip, friction, bandwidth, saturation; its fastest mode is slower than the steps."""
+    """A scene with some of cable, grip, friction, bandwidth, saturation; its fastest mode is slow beside the steps."""
     tables: dict[str, Any] = {
         "duration": STEPS / RATE,
         "clock": {"plant_rate": RATE, "control_rate": RATE // 5},
@@ -53,11 +53,11 @@ def chain_scene(rng: np.random.Generator, effects: str) -> Scene:
 
 @dataclass
 class Made:
-    """A chain, and its energies known beforehand.
+    """A chain, and its energies, which are known from its making.
 
     Attributes:
         columns: telemetry of all steps and the end, ``pieces.*`` of the steps that were cut.
-        commanded: two forces that make up what was commanded, shape (STEPS,) each, N.
+        commanded: the two forces that make up the command, shape (STEPS,) each, N.
         energies: work of tau, heats, friction_heat and actuator in every step, J, shape (STEPS,).
     """
 
@@ -86,7 +86,7 @@ class _Maker:
         self.inputs = 4  # command, friction, load, its slope
 
     def rates(self) -> np.ndarray:
-        """Of (positions, velocities, actuator, command, friction, load, slope) under the present mode."""
+        """Rates of (positions, velocities, actuator, command, friction, load, slope) in the present mode."""
         bodies, size = self.bodies, len(self.z)
         bodies.friction = None
         units = np.eye(len(bodies.z))[:size]
@@ -111,7 +111,7 @@ class _Maker:
         return self.flows[self.is_stuck, duration] @ acting
 
     def recorded(self) -> dict[str, float]:
-        """The present state as telemetry names it."""
+        """The present state under the names of telemetry."""
         n, z = self.count, self.z
         state = {"x": z[0], "v": z[n], "x_low": 0.0}
         for i, link in enumerate(self.links):
@@ -120,7 +120,7 @@ class _Maker:
         return state | ({"actuator": z[2 * n]} if self.lags else {})
 
     def move(self, duration: float, acting: np.ndarray, commanded: float) -> dict[str, float]:
-        """Move on; returns what moved where on the way."""
+        """Moves on; returns the energies that were moved meanwhile."""
         energies: dict[str, float] = {}
         for node, weight in zip((NODES + 1) / 2 * duration, WEIGHTS / 2 * duration, strict=True):
             for name, power in self.powers(self.after(float(node), acting), commanded).items():
@@ -160,7 +160,7 @@ class _Maker:
         return levels
 
     def stop(self) -> float:
-        """Body 0 comes to rest; returns the energy that takes, J."""
+        """Brings body 0 to rest; returns the energy that this takes, J."""
         taken = self.bodies.m[0] * self.z[self.count] ** 2 / 2
         self.z[self.count] = 0.0
         self.is_stuck = bool(self.rng.random() < 0.7)
@@ -168,7 +168,7 @@ class _Maker:
 
 
 def make(scene: Scene, rng: np.random.Generator) -> Made:
-    """Move the chain of a scene under random forces and random friction."""
+    """Moves the chain of a scene under random forces and random friction."""
     maker = _Maker(scene, rng)
     tau = TAU["amplitude"] * np.sin(2 * np.pi * TAU["frequency"] * (np.arange(STEPS + 1) / RATE))
     loads = tau + maker.bodies.hand_k * maker.rest

@@ -40,6 +40,6 @@ class ChainLoop(OneTickMap):
         return np.column_stack([rate(unit, 0.0) for unit in units]), rate(np.zeros(len(bodies.z)), 1.0)
 
     def modes_Hz(self) -> np.ndarray:
-        """Frequencies at which the plant swings by itself, rising."""
+        """Natural frequencies of the plant alone, rising."""
         modes = np.linalg.eigvals(self.rates()[0]).imag / (2.0 * np.pi)
         return np.sort(modes[modes > 1e-9])

@@ -1,4 +1,4 @@
-"""The flow of m a + b v + k x = F once more, in fifty decimal digits: a power series, halved and squared."""
+"""The flow of m a + b v + k x = F a second time, in fifty decimal digits: a power series, halved and squared."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The plant with its effects a second time: bodies in absolute coordinates, integrated numerically from event to event.
 
-scipy's DOP853 at 1e-12; dry friction as an event that ends a piece of the motion; every heat and every work as a state
-of its own, integrated beside the motion. Nothing is shared with haploop but the scene.
+scipy's DOP853 at 1e-12; dry friction as an event that ends a piece of the motion; every heat and every work as a
+separate state, integrated together with the motion. Only the scene is shared with haploop.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class Bodies:
     """[motor -cable-] tip [-grip- hand] - hand's spring and damper - ground, from a resolved scene.
 
     The state is z = (x_0 ... x_N-1, v_0 ... v_N-1, p, y, energies), p the force of the actuator and y the output of a
-    band-limited accelerometer (both 0 where the scene has none), energies as named by ``books``.
+    band-limited accelerometer (both 0 where the scene has none), energies named by ``books``.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -68,7 +68,7 @@ class Bodies:
         return self.friction.kinetic if self.friction.breakaway is None else self.friction.breakaway
 
     def net(self, z: np.ndarray, command: float, tau: float) -> np.ndarray:
-        """All forces on every body but friction, N."""
+        """The sum of all forces except friction on every body, N."""
         n = self.count
         x, v = z[:n], z[n : 2 * n]
         force = -self.ground * v
@@ -97,7 +97,7 @@ class Bodies:
         return np.concatenate([v, a, low_passed, energies, self.ground * v**2, self.link_b * stretching**2])
 
     def stored_J(self) -> float:
-        """Kinetic energy and that of all springs."""
+        """Kinetic energy and the energy of all springs, J."""
         n, z = self.count, self.z
         kinetic, springs = self.m * z[n : 2 * n] ** 2, self.link_k * np.diff(z[:n]) ** 2
         return (kinetic.sum() + springs.sum() + self.hand_k * (z[n - 1] - self.rest) ** 2) / 2.0
@@ -112,7 +112,7 @@ class Bodies:
         return float(self.accelerations(self.z, command, tau)[self.meter_body])
 
     def advance(self, command: float, tau: float, slope: float, duration: float) -> None:
-        """Move on under a held command and tau + slope t, from one stop or slip of body 0 to the next."""
+        """Moves on under a held command and tau + slope t, from one stop or slip of body 0 to the next."""
         done = 0.0
         while done < duration:
             if self.friction is not None and self.sliding == 0.0:
@@ -127,7 +127,7 @@ class Bodies:
             self.sliding = math.copysign(1.0, load)
 
     def _piece(self, command: float, tau: float, slope: float, duration: float) -> float:
-        """Move until body 0 stops or breaks away, at most so long; returns how long it was."""
+        """Moves until body 0 stops or breaks away, at most for ``duration``; returns how long it took."""
         n, forces = self.count, (command, tau, slope)
         if self.friction is None:
             self.z = self._solve(duration, forces)
@@ -138,7 +138,7 @@ class Bodies:
             for t, z in zip(found.t_events[1], found.y_events[1], strict=True)
             if self._spare(t, z, *forces) < 0
         ]
-        if hidden:  # it ceases before and is back by the end of an integration step
+        if hidden:  # the margin vanishes and returns within an integration step
             found = self._solved(hidden[0], forces, self._events())
         if not found.t_events[0].size:
             self.z = found.y[:, -1]
@@ -153,7 +153,7 @@ class Bodies:
         return length
 
     def _spare(self, t: float, z: np.ndarray, command: float, tau: float, slope: float) -> float:
-        """Returns what is left, above 0, until body 0 stops (speed) or breaks away (force)."""
+        """Returns the margin, above 0, until body 0 stops (speed) or breaks away (force)."""
         if self.sliding:
             return self.sliding * float(z[self.count])
         return self.breakaway_N - abs(self._load(t, z, command, tau + slope * t))
@@ -167,7 +167,7 @@ class Bodies:
         return -math.copysign(load_rate, load_rate * self._load(t, z, command, tau + slope * t))
 
     def _events(self) -> list[Any]:
-        """Nothing left, which ends the piece; and the least that is left on the way."""
+        """The end of the margin, which ends the piece, and the minima of the margin before."""
 
         def ceases(*at: Any) -> float:
             return self._spare(*at)

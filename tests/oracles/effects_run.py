@@ -1,4 +1,4 @@
-"""Running the reference of the effects: under forces that are given, and closed by the reference's controller."""
+"""Runs of the reference of the effects: under given forces, and closed by the reference's controller."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class EffectsTruth:
     """The motion and the books of the reference.
 
     Attributes:
-        force: commanded over every step, N.
+        force: force commanded over every step, N.
         energies: heats and works since the start by name, J.
         stored: energy stored at the steps and at the end, J.
-        controller: what closed the loop, if anything did.
+        controller: the controller that closed the loop, if any.
     """
 
     def __init__(self, scene: Scene, steps: int) -> None:
@@ -35,7 +35,7 @@ class EffectsTruth:
         self.controller: Controller | None = None
 
     def step(self, force: float) -> None:
-        """One plant step under a commanded force."""
+        """Makes one plant step under a commanded force."""
         start, end = self.tau[len(self.force) : len(self.force) + 2]
         self.bodies.advance(force, start, (end - start) / self.step_s, self.step_s)
         self.force.append(force)
@@ -50,7 +50,7 @@ class EffectsTruth:
 
     @property
     def v(self) -> np.ndarray:
-        """Their velocities."""
+        """Velocities of all bodies, of the same shape."""
         return np.array(self.states)[:, self.bodies.count : 2 * self.bodies.count]
 
     @property
@@ -59,7 +59,7 @@ class EffectsTruth:
 
     @property
     def unexplained_J(self) -> float:
-        """The residual of the reference's own books: how well it was integrated."""
+        """The residual of the reference's own books, which shows how well it was integrated."""
         e = self.energies
         heats = [-value for name, value in e.items() if "heat" in name]
         return math.fsum([self.stored[0], e["hand_work"], e["actuator_work"], *heats, -self.stored[-1]])
@@ -74,7 +74,7 @@ def follow(scene: Scene, forces: Sequence[float]) -> EffectsTruth:
 
 
 def simulate(scene: Scene) -> EffectsTruth:
-    """The whole loop, as long as nothing in it is random and no actuator limits it."""
+    """The whole loop, provided that nothing in it is random and no actuator limits it."""
     clock = scene.clock
     n = clock.plant_rate // clock.control_rate
     delay = round(clock.round_trip_delay * clock.plant_rate)

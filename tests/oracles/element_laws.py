@@ -1,7 +1,7 @@
 """Taps of a free mass on a sampled spring under stabilizers, written from their sources with penetrations and pushes.
 
-The mass comes from above onto a wall below 0; ``p`` is how deep it is, ``push`` a force out of the wall. A law is a
-generator: it is sent (depth, whether inside, push of the spring) and gives the push that is added.
+The mass comes from above onto a wall below 0; ``p`` is its penetration, ``push`` a force out of the wall. A law is a
+generator: it is sent (depth, whether inside, push of the spring) and yields the push that is added.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Tap(NamedTuple):
     speed: float
 
     def taken_J(self) -> tuple[float, float]:
-        """What spring and law took by the ways from tick to tick, each push times the way that follows it."""
+        """The energies that spring and law took: each push times the displacement to the next tick, summed."""
         ways = [after - before for before, after in pairwise(self.depth[:-1])]
         rows = (self.spring, self.added)
         return tuple(math.fsum(push * way for push, way in zip(row, ways, strict=False)) for row in rows)  # type: ignore
@@ -59,7 +59,7 @@ def fallen(p: float, inward: float, push: float, mass: float, damping: float, pe
 
 
 def observed(most: float, *, reference: float = 0.0, reset: bool = False, inertia: float = 0.0, period: float) -> Law:
-    """Passivity observer and controller: every push times the way after it; the damper takes what is missing."""
+    """Passivity observer and controller: each push times the way after it; the damper takes what is missing."""
     energy, push, before, speeds = 0.0, 0.0, None, (0.0, 0.0)
     p, inside, spring = yield 0.0
     while True:
@@ -83,7 +83,7 @@ def observed(most: float, *, reference: float = 0.0, reset: bool = False, inerti
 
 
 def resisting(damping: float = 0.0, mass: float = 0.0, *, one_way: bool = False, period: float) -> Law:
-    """Damping and inertia; one way: damping on the way in alone, inertia while speed and last change agree in sign."""
+    """Damping and inertia; one way: damping only on the way in, inertia while speed and last change agree in sign."""
     p, _, _ = yield 0.0
     before, rate_before, change_before = p, 0.0, 0.0
     while True:
@@ -96,7 +96,7 @@ def resisting(damping: float = 0.0, mass: float = 0.0, *, one_way: bool = False,
 
 
 def bounded(damping: float, *, period: float) -> Law:
-    """Force bounding: the push may be no more than the damping of the device can answer for."""
+    """Force bounding: the push may be no larger than the damping of the device can dissipate."""
     energy, push, before = 0.0, 0.0, None
     p, inside, spring = yield 0.0
     while True:
@@ -119,7 +119,7 @@ def leading(time: float, *, period: float) -> Law:
 
 
 def coupled(stiffness: float, damping: float, mass: float, wall: float, *, ticks: int = 1, period: float) -> Law:
-    """A virtual tool that steps every so many ticks, implicitly, by bisection; the wall pushes the tool alone."""
+    """A virtual tool that steps every ``ticks`` ticks, implicitly, by bisection; the wall pushes only the tool."""
     p, _, spring = yield 0.0
     y, inward, before, at_step, step, tick = p, 0.0, p, p, ticks * period, 0
 
@@ -138,7 +138,7 @@ def coupled(stiffness: float, damping: float, mass: float, wall: float, *, ticks
 
 
 def root_of(rising: Callable[[float], float]) -> float:
-    """Zero of a rising, piecewise linear function, by bisection and one last secant."""
+    """Zero of a rising, piecewise linear function, by bisection."""
     low, high = -10.0, 10.0
     for _ in range(60):
         middle = (low + high) / 2

@@ -8,7 +8,7 @@ from helpers.runs.captured import Captured
 
 
 def friction_heats(ran: Captured) -> np.ndarray:
-    """Returns the heat of friction in every step in one piece, and in every piece of the others, J."""
+    """Returns the heat of friction in every step of one piece, and in every piece of the other steps, J."""
     plant = ran.plant
     dx = np.diff(plant["x"]) + np.diff(plant["x_low"])
     whole = -plant["friction"][:-1] * dx

@@ -1,7 +1,7 @@
 """A device held to a wall by a swaying hand, written by hand: bodies, cable, grip, dry friction, encoder, elements.
 
-Nothing of the code it judges is used: semi-implicit Euler steps of 50 us, friction as the impulse that stops a body, a
-buzz of motion or force read off turning points instead of spectra. All holds in all corners are columns of one array.
+It uses nothing of the code it judges: semi-implicit Euler steps of 50 us, friction as the impulse that stops a body, a
+buzz of motion or force found from turning points instead of spectra. All holds in all corners are columns of one array.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _SCALED = (
     ("cable_stiffness",),
     ("cable_damping",),
 )
-# Walls bear less where there is less of these: corners with little of all are half of those that are taken.
+# With less of these, walls bear less: half of the corners taken have little of all of them.
 _HOLDS = {"friction", "damping", "motor_damping", "cable_damping"}
 _NUMBERS = [field.name for field in fields(Bodies) if field.name != "delay_s"]
 # What a preset assumes of its device.
@@ -74,8 +74,8 @@ def in_corners(
 ) -> tuple[Bodies, np.ndarray]:
     """Returns the members: every hold in the loop as described and in all its corners, and their holds.
 
-    All that is measured is a fifth off, what is assumed is half or double; of more corners as many are drawn as
-    ``most``, half of them with little friction and damping.
+    All measured values are a fifth off, assumed ones half or double. Where there are more corners than ``most``, that
+    many are drawn, half of them with little friction and damping.
     """
     there = [
         tuple(name for name in names if name not in assumed and np.any(getattr(device, name))) for names in _SCALED
@@ -105,7 +105,7 @@ def press(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     """Returns position at the encoder, counts and command at the ticks, each of shape (ticks, members).
 
-    Stiffness, elements by their kind, and the hand are numbers or one for each member.
+    Stiffness, elements by kind, and the hand's values are single numbers, or one for each member.
     """
     members, ticks = len(holds), round(lasts_s / PERIOD_S)
     has_cable, h = bool(np.any(of.motor_mass)), STEP_S
@@ -155,11 +155,11 @@ def _rubbed(v: np.ndarray, most: np.ndarray) -> np.ndarray:
 def buzzes(
     of: Bodies, x: np.ndarray, counts: np.ndarray, forces: np.ndarray, begins_s: float = 1.0, stretch_s: float = 0.2
 ) -> np.ndarray:
-    """Tells of each member whether it goes to and fro so that it is felt, by its turning points alone.
+    """Tells for each member whether it goes to and fro so that it is felt, from its turning points alone.
 
-    In a stretch with four turns of the counts or more, the third largest way back is compared with what is felt at the
-    rate of the turns: through the points 52, 17 and 0.12 um, peak to peak, at 10, 20 and 320 Hz (Israr et al. 2006);
-    that of the command with the force that moves the bodies by as much.
+    In a stretch with four turns of the counts or more, the third largest swing back is compared with what is felt at
+    the rate of the turns: through the points 52, 17 and 0.12 um, peak to peak, at 10, 20 and 320 Hz (Israr et al.
+    2006); that of the command is compared with the force that moves the bodies by as much.
     """
     size, found = round(stretch_s / PERIOD_S), np.zeros(x.shape[1], bool)
     points = np.log([10.0, 20.0, 320.0]), np.log([52e-6, 17e-6, 0.12e-6])
@@ -173,7 +173,7 @@ def buzzes(
 
 
 def _to_and_fro(piece: np.ndarray, seconds: float) -> tuple[float, float]:
-    """Returns the third largest way back of a trace, and how often a second it turns twice."""
+    """Returns the third largest swing back of a trace, and how many times a second it turns twice."""
     moves = piece[np.append(True, np.diff(piece) != 0.0)]
     ways = np.diff(moves)
     swings = np.abs(np.diff(moves[[0, *(1 + np.flatnonzero(ways[1:] * ways[:-1] < 0)), -1]]))
@@ -182,7 +182,7 @@ def _to_and_fro(piece: np.ndarray, seconds: float) -> tuple[float, float]:
 
 
 def _stiffness(of: Bodies, member: int, frequency: float) -> float:
-    """Returns the force at the encoder that moves it by a metre at a frequency, hand and cable hanging on it, N/m."""
+    """Returns the force at the encoder that moves it by a metre at a frequency, with hand and cable attached, N/m."""
     one = columns(of, np.array(member))
     s = 2j * np.pi * frequency
     grip, cable = one.grip_stiffness + one.grip_damping * s, one.cable_stiffness + one.cable_damping * s
@@ -194,7 +194,7 @@ def _stiffness(of: Bodies, member: int, frequency: float) -> float:
 
 
 def turns(counts: np.ndarray, begins_s: float = 1.0, stretch_s: float = 0.25) -> np.ndarray:
-    """Counts of each member the most turns of its counts in any stretch: chatter, however narrow."""
+    """Returns, for each member, the most turns of its counts in any stretch: chatter, however narrow."""
     size = round(stretch_s / PERIOD_S)
     begins = range(round(begins_s / PERIOD_S), len(counts) - size + 1, size // 2)
     return np.max([_turns(counts[begin : begin + size]) for begin in begins], axis=0)

@@ -1,8 +1,8 @@
-"""Fate of loops in the long run: each is run, held still, pushed, and left alone for 40 s and more.
+"""Behaviour of loops in the long run: each is run, held still, pushed, and left alone for 40 s and more.
 
-Written by hand, with nothing of the code that is judged by it: all loops side by side in arrays, bodies by the matrix
-exponential in absolute coordinates, dry friction as an impulse that stops a body, noise of its own. Scenes are
-dictionaries, as ``as_dict`` gives them.
+Written by hand, without any of the code that it judges: all loops side by side in arrays, bodies by the matrix
+exponential in absolute coordinates, dry friction as an impulse that stops a body, independent noise. Scenes are
+dictionaries, as ``as_dict`` returns them.
 """
 
 from __future__ import annotations
@@ -16,14 +16,15 @@ from scipy.linalg import expm
 TICK_S, STEPS, STEP_S = 1e-3, 10, 1e-4
 PUSH, SMALLER, PUSH_TICKS = 0.3, 0.1, 50
 SOON_S, LATE_S, LONG_S, LOOK_S = 20.0, 40.0, 160.0, 5.0
-# A swing dies, or grows, by more than this in the logarithm of its width in 20 s; how alike it goes on, as a share.
+# A swing that dies, or grows, changes the logarithm of its width by more than this in 20 s; how alike the later change
+# must be for it to continue, as a share.
 _DIES, _GROWS, _ALIKE = 0.01, 0.005, 0.3
-# Less is rounding, m.
+# Smaller widths are rounding, m.
 _LEAST_M = 1e-7
 
 
 def swings(scenes: list[dict[str, Any]]) -> list[float]:
-    """Returns how many times as strong as what a hand feels each loop swings long after a push; inf off its limit."""
+    """Returns each loop's swing long after a push over the least that a hand feels; inf for a loop beyond its limit."""
     found = np.zeros(len(scenes))
     rubbed = np.array([_friction(scene) > 0.0 for scene in scenes])
     for group in (rubbed, ~rubbed):
@@ -39,7 +40,8 @@ def _swings(scenes: list[dict[str, Any]]) -> np.ndarray:
     loops.push()
     soon, late = (loops.go_to(seconds) for seconds in (SOON_S, LATE_S))
     most, grew = felt(late), _grew(soon, late)
-    # What is felt and dies, or is not and grows, is left alone for longer: if it does so still, it goes on to.
+    # A swing that is felt and dies, or is not felt and grows, is left alone for longer: if it still does so, it is
+    # taken to continue.
     changes = np.where(most >= 1.0, -grew > _DIES, grew > _GROWS)
     some = np.flatnonzero(~loops.gone & changes)
     if len(some):
@@ -54,15 +56,15 @@ def _swings(scenes: list[dict[str, Any]]) -> np.ndarray:
 
 
 def _grew(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Returns by how much the logarithm of the width grew between two traces."""
+    """Returns the growth of the logarithm of the width between two traces."""
     widths_m = (np.maximum(np.ptp(x, axis=0), _LEAST_M) for x in (before, after))
     return np.subtract(*reversed([*np.log([*widths_m])]))
 
 
 def felt(x: np.ndarray) -> np.ndarray:
-    """Returns how many times as strong as what a hand feels each trace is, shape (ticks, members).
+    """Returns the strength of each trace, shape (ticks, members), over the least that a hand feels.
 
-    Israr et al. 2006 at every frequency, their energies added (Bensmaia et al. 2005).
+    By Israr et al. 2006 at every frequency, with energies added (Bensmaia et al. 2005).
     """
     t = np.linspace(-1.0, 1.0, len(x))[:, None]
     x = x - x.mean(axis=0) - t * ((t * x).sum(axis=0) / (t * t).sum())
@@ -79,11 +81,11 @@ def _friction(scene: dict[str, Any]) -> float:
 
 
 class Loops:
-    """Some loops, all with dry friction or none; arrays have the members last, but for the matrices.
+    """Some loops, all with dry friction or none; arrays have the members last, except the matrices.
 
     Attributes:
-        gone: which left their limit, of those still there.
-        left: which of all members left it.
+        gone: which of the members still there have left their limit.
+        left: which of all members have left it.
     """
 
     def __init__(self, scenes: list[dict[str, Any]]) -> None:
@@ -120,7 +122,7 @@ class Loops:
         self.gone, self.left = np.zeros(n, bool), np.zeros(n, bool)
 
     def run(self) -> None:
-        """Runs each to the end of its scene, all ends at once, with hands that move and noise."""
+        """Runs each to the end of its scene, with moving hands and noise, so that all end at the same time."""
         n = len(self.scenes)
         ticks = np.array([round(scene["duration"] / TICK_S) for scene in self.scenes])
         rng = np.random.default_rng(1)
@@ -140,7 +142,7 @@ class Loops:
         self._hold = total / np.maximum(count, 1)
 
     def push(self) -> None:
-        """Makes two of each, of which the first is pushed a tenth as hard as the other, and lets them go."""
+        """Makes two of each, pushes the first a tenth as hard as the second, and lets them go."""
         twice = np.tile(np.arange(len(self.scenes)), 2)
         self.take(twice)
         self.of, self.left = np.arange(len(twice)), np.zeros(len(twice), bool)
@@ -150,7 +152,7 @@ class Loops:
         self._pushed = self._tick
 
     def go_to(self, seconds: float) -> np.ndarray:
-        """Goes on until so long after the push; returns the position of the last 5 s, shape (ticks, members)."""
+        """Continues until ``seconds`` after the push; returns the position of the last 5 s, shape (ticks, members)."""
         end, size = self._pushed + round(seconds / TICK_S), round(LOOK_S / TICK_S)
         trace = np.zeros((size, len(self._z)))
         while self._tick < end:
@@ -160,7 +162,7 @@ class Loops:
         return trace
 
     def take(self, places: np.ndarray) -> None:
-        """Goes on with the members at these places alone; one may be named twice."""
+        """Continues with only the members at these places; one may be named twice."""
         for name in ("_first_mass", "_friction", "_wall", "_limit", "_most", "_count", "_keep", "_late", "_z", "_start",
                      "_x", "_v", "_a", "gone", "of", "_hold"):  # fmt: skip
             setattr(self, name, getattr(self, name)[places])
@@ -168,7 +170,7 @@ class Loops:
         self._pieces = [(flow[places], old[places]) for flow, old in self._pieces]
 
     def _go(self, hand: np.ndarray, noise: Any = 0.0, waits: Any = False) -> np.ndarray:
-        """Goes on by a tick under a force of the hand in N; returns which were in contact."""
+        """Continues by a tick under a force of the hand in N; returns which members were in contact."""
         x = self._z[:, 0] + noise
         counted = self._count > 0.0
         x = np.where(counted, np.rint(x / np.where(counted, self._count, 1.0)) * self._count, x)
@@ -227,10 +229,10 @@ def _hand_N(scene: dict[str, Any], t: float) -> float:
 
 
 def _flow(scene: dict[str, Any], steps: int) -> np.ndarray:
-    """What so many steps do to (3 positions, 3 velocities, force on the first body, on the last), shape (8, 8)."""
+    """The map of ``steps`` steps of (3 positions, 3 velocities, force on the first body, on the last), shape (8, 8)."""
     device, hand, cable = scene["device"], scene.get("hand") or {}, scene.get("transmission")
     grip = hand.get("grip")
-    # (mass, damping to the ground) of each, and the links between them.
+    # (mass, damping to the ground) of each body, and the links between them.
     bodies, links = [[device["mass"], device.get("damping", 0.0)]], []
     if cable:
         bodies.insert(0, [cable["motor_mass"], cable.get("motor_damping", 0.0)])

@@ -1,4 +1,4 @@
-"""The linear loop as one matrix: what a whole tick does to state, past sample and commands in flight."""
+"""The linear loop as one matrix: the effect of a whole tick on state, past sample and commands in flight."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class OneTickMap(ABC):
 
     @cached_property
     def _flows(self) -> tuple[np.ndarray, np.ndarray]:
-        """From (z, u) to z over the first r steps of an interval and over the rest, each of shape (m, m + 1)."""
+        """Maps from (z, u) to z over the first r steps of an interval and over the rest, each of shape (m, m + 1)."""
         a, b = self.rates()
         rates = np.vstack([np.column_stack([a, b]), np.zeros(len(b) + 1)])
         late = self.delay_steps % self.steps_per_tick
@@ -57,7 +57,7 @@ class OneTickMap(ABC):
         return np.stack([*state, np.eye(size)[0], *in_flight[: whole + 1]])
 
     def magnitudes(self, stiffness: float) -> np.ndarray:
-        """Of the eigenvalues of M, the largest first: what every mode is multiplied by in a tick."""
+        """Magnitudes of the eigenvalues of M, the largest first: the factors by which the modes change in a tick."""
         return np.sort(np.abs(np.linalg.eigvals(self.matrix(stiffness))))[::-1]
 
     def growth(self, stiffness: float) -> float:

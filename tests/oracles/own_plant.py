@@ -1,11 +1,11 @@
-"""Plants of a device and a hand as one mass, by an integrator of one's choice; nothing of haploop is imported.
+"""Plants of a device and a hand as one mass, by a chosen integrator; nothing of haploop is imported.
 
 usage (as the plant of a run): own_plant.py METHOD [SHARE [HELD]] DIRECTORY
 
 m a + b v + k (x - rest) = f + tau, f held over a plant step, tau a straight line over it.
-METHOD: exact, rk4, euler (explicit), semi (semi-implicit Euler), or gain: exact, but for the velocity after each step,
-which is made larger by SHARE (smaller where it is below 0), so that it invents energy on purpose.
-HELD: a file for the force that a device would be given at every tick, one a line.
+METHOD: exact, rk4, euler (explicit), semi (semi-implicit Euler), or gain: exact, except that the velocity after each
+step is made larger by SHARE (smaller where SHARE is below 0), so that it invents energy on purpose.
+HELD: a file for the force that a device would be given at every tick, one per line.
 """
 
 import os
@@ -20,7 +20,7 @@ METHODS = ("exact", "rk4", "euler", "semi", "gain")
 
 
 class OnePart:
-    """Device and hand of a scene, a table as the protocol has it: x in m, v in m/s, and the step that moves them on."""
+    """Device and hand of a scene, a table as in the protocol: x in m, v in m/s, and the step that moves them on."""
 
     def __init__(self, scene, step_s, method, share=0.0):
         device, hand = scene["device"], scene.get("hand") or {}

@@ -3,12 +3,12 @@
 usage: plain_controller.py [--seat FILE] [--nameless] [--changes make|refuse] [--misbehave HOW --at TICK] [DIRECTORY]
 
 Takes the controller's place in a run: a wall and one element of unidirectional inertia in contact (Choi et al. 2022,
-eq. 9 and 12), both derivatives as backward differences. Started by haploop, stdin brings a line of JSON; --seat names
-the file of a run that waits for it instead.
---nameless: JOIN ends before the map that says what joins, as the first page of the protocol had it.
---changes: what becomes of a set of the wall's stiffness; without, every change is passed over in silence.
---misbehave: from that tick on: die, exit, hang, silent (answers no more, but reports), nan, text (a force
-  that is none), garbage (bytes in place of forces), mute (no telemetry), cut (a telemetry column
+eq. 9 and 12), both derivatives as backward differences. When haploop starts it, stdin holds a line of JSON; --seat
+names the file of a run that waits for it instead.
+--nameless: JOIN ends before the map that says what joins, as in the first version of the protocol's page.
+--changes: what it does with a set of the wall's stiffness; without this option, it ignores every change silently.
+--misbehave: from that tick on: die, exit, hang, silent (stops answering, but reports), nan, text (a force
+  that is not a number), garbage (bytes in place of forces), mute (no telemetry), cut (a telemetry column
   too short), unfinished (no END).
 """
 
@@ -101,7 +101,7 @@ class Controller:
                 raise SystemExit(f"aborted: {fields[0]}")
 
     def serve(self, wait_ms=0):
-        """Answers new subscriptions; only between two blocks. Tells whether there was one."""
+        """Answers new subscriptions; to be called only between two blocks. Tells whether there was one."""
         asked = False
         while self.telemetry.poll(wait_ms):
             request, wait_ms = self.telemetry.recv(), 0
@@ -223,7 +223,7 @@ def main():
     parser.add_argument("--at", type=int, default=500)
     options = parser.parse_args()
     if options.seat:
-        signal.alarm(120)  # never left behind
+        signal.alarm(120)  # so that it is never left behind
         start = json.loads(options.seat.read_text(encoding="utf-8"))
     else:
         start = {**json.loads(sys.stdin.readline()), "directory": options.directory}

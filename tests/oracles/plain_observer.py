@@ -3,9 +3,9 @@
 usage: plain_observer.py RUN_JSON [--viewer] [--ticks N] [--dwell]
 
 Attaches to the run that RUN_JSON announces, prints one JSON line when it has the state of plant and controller, reads
-on for N ticks or to the end of the run, leaves, and prints a second JSON line with all it saw.
---viewer: join no clock and report nothing, so that the run does not wait; what is missed is counted. Whenever all that
-  has come is taken in, a JSON line says how far.
+on for N ticks or to the end of the run, leaves, and prints a second JSON line with everything it saw.
+--viewer: join no clock and report nothing, so that the run does not wait; missed ticks are counted. Whenever everything
+  received has been read, a JSON line says how far.
 --dwell: after attaching, report and stay, but take no more blocks (for tests that end this process).
 """
 
@@ -28,7 +28,7 @@ ROLES = ("plant", "controller")
 
 
 class Stream:
-    """One publisher's blocks: checks that ticks follow each other, and counts those that do not come."""
+    """One publisher's blocks: checks that ticks follow each other, and counts those that are missing."""
 
     def __init__(self, context, role, address):
         self.role = role
@@ -88,7 +88,7 @@ class Clock:
 
     def join(self):
         while True:
-            self.say(JOIN, "plain observer", "", os.getpid(), {}, True)  # who it is, it may leave out
+            self.say(JOIN, "plain observer", "", os.getpid(), {}, True)  # it may leave out who it is
             code, *fields = self.hear()
             if code == WELCOME:
                 return dict(zip(("run", "scene", "timebase", "endpoints", "granted", "context"), fields, strict=True))
@@ -116,7 +116,7 @@ def main():
     parser.add_argument("--dwell", action="store_true")
     parser.add_argument("--ticks", type=int)
     options = parser.parse_args()
-    signal.alarm(60)  # never left behind
+    signal.alarm(60)  # so that it is never left behind
     entry = json.loads(options.run.read_text(encoding="utf-8"))
     context = zmq.Context()
     clock = None if options.viewer else Clock(context, entry["clock"])

@@ -1,4 +1,4 @@
-"""A subscriber that reads by PlotJuggler's rules: its ZMQ plugin and msgpack parser, version 3.16, in Python."""
+"""A subscriber that follows PlotJuggler's rules: its ZMQ plugin and msgpack parser, version 3.16, in Python."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Parser:
 
     Attributes:
         series: name -> points (time in s, value).
-        samples: the maps that came, in order.
+        samples: the maps received, in order.
     """
 
     def __init__(self, topic: str) -> None:
@@ -29,9 +29,9 @@ class Parser:
         self.samples: list[dict[str, float]] = []
 
     def parse(self, message: Any, t: float) -> float:
-        """Take a message that arrived at time ``t``; returns the time of its last sample.
+        """Takes a message that arrived at time ``t``; returns the time of its last sample.
 
-        A sample without its time gets that of the one before it in the message, and from then on none is looked for.
+        A sample without a time gets that of the one before it in the message, and from then on no time is looked for.
         """
         if isinstance(message, list):
             for element in message:
@@ -73,7 +73,7 @@ class Viewer:
         self.parsers: dict[str, Parser] = {}
 
     def read(self, timeout_ms: int) -> str | None:
-        """Take one message; its topic, or None when none came."""
+        """Takes one message; returns its topic, or None when none came."""
         if not self._socket.poll(timeout_ms):
             return None
         frames = self._socket.recv_multipart()
@@ -83,7 +83,7 @@ class Viewer:
         return topic
 
     def read_to(self, topic: str) -> None:
-        """Read until a message of this topic comes."""
+        """Reads until a message of this topic comes."""
         while True:
             came = self.read(120_000)
             assert came is not None, f"nothing more came, not even {topic}"

@@ -1,9 +1,9 @@
-"""The loop a second time, written another way: what haploop computes must come out of this too.
+"""The loop a second time, written another way: it must give the same results as haploop.
 
 Step: scipy's matrix exponential of the state with its inputs appended. Heat and work of the hand: Gauss-Legendre
 quadrature along the exact motion. Controller: one function with the formulas of the definitions, in floats and in the
 order they are written, since the last bits of a quantised position decide the sign of v[k] a[k-1] where the counts of
-two ticks change alike. Books: exact sums (``math.fsum``) over the whole run.
+two ticks change by the same amount. Books: exact sums (``math.fsum``) over the whole run.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def hand_force_N(table: HandForce | None, t: float) -> float:
 
 
 class Mechanics:
-    """(x, v, F, dF/dt) over a step, F all forces but damper and spring; x from the hand's rest position."""
+    """(x, v, F, dF/dt) over a step, with F all forces except damper and spring; x from the hand's rest position."""
 
     def __init__(self, scene: Scene) -> None:
         device, hand = scene.device, scene.hand or Hand()
@@ -72,7 +72,7 @@ class Mechanics:
 
 @dataclass
 class Element:
-    """One element of the scene's list, with the force it gave at every tick."""
+    """One element of the scene's list, with its force at every tick."""
 
     table: ElementTable
     from_tick: int

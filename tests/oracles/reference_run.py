@@ -1,4 +1,4 @@
-"""Running the second writing of the loop, and its books."""
+"""Runs of the reference of the loop, and its books."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from oracles.reference import Controller, Mechanics, hand_force_N
 
 @dataclass
 class Truth:
-    """A run of the reference: states at every step and the end, commands held, the controller, the books in J."""
+    """A run of the reference: states at every step and the end, held commands, the controller, the books in J."""
 
     x: np.ndarray
     v: np.ndarray
@@ -25,7 +25,7 @@ class Truth:
 
 
 def simulate(scene: Scene, start_beside: float = 0.0) -> Truth:
-    """Run a resolved scene, started so many metres and metres per second beside where it says."""
+    """Runs a resolved scene, started ``start_beside`` (in m and in m/s) beside its own start."""
     mechanics, controller = Mechanics(scene), Controller(scene)
     clock = scene.clock
     n = clock.plant_rate // clock.control_rate
@@ -104,7 +104,7 @@ def _books(
 def _leak(
     controller: Controller, x: np.ndarray, dx: np.ndarray, n: int, forces: dict[int, float], applied: np.ndarray
 ) -> dict[str, float]:
-    """The leak of a wall that does not change, cause by cause; nothing without a wall or where an event sets one."""
+    """The leak of a wall that does not change, by cause; empty without a wall or where an event sets anything."""
     wall = controller.scene.wall
     if wall is None or any(event.set for _, event in controller.events):
         return {}

@@ -1,4 +1,4 @@
-"""Snapshots as the server of the live page sends them, written out from the description of the format alone."""
+"""Snapshots as the server of the live page sends them, written from the description of the format alone."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def table(name: str, t0_s: float, dt_s: float, *columns: Column, envelope: bool 
 
 
 def snapshot(from_s: float, to_s: float, *tables: dict[str, Any], **more: Any) -> bytes:
-    """Length and header, then the columns of every table as little-endian 32-bit floats, each table filled up to 8."""
+    """Length and header, then each table's columns as little-endian 32-bit floats, padded to a multiple of 8 bytes."""
     rows = [len(t["columns"][0][3]) for t in tables]
     described = [
         {
@@ -83,7 +83,7 @@ def contact(from_s: float = 0.0, to_s: float = 2.0, rows: int = 1000, wall_m: fl
 
 
 def positions(x, wall=None):
-    """Returns a snapshot of 2 s of position, m, and of a wall that stands still."""
+    """Returns a snapshot of 2 s of position, m, and of a fixed wall."""
     columns = [("x", "m", "position", x)]
     if wall:
         columns.append(("wall", "m", "wall", [wall] * len(x)))

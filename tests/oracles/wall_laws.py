@@ -1,6 +1,6 @@
-"""Taps of a free mass on walls that are no springs, written from their laws with penetrations and pushes.
+"""Taps of a free mass on walls that are not springs, written from their laws with penetrations and pushes.
 
-The mass comes from above onto a wall below 0; ``p`` is how deep it is, ``push`` a force out of the wall. A law is a
+The mass comes from above onto a wall below 0; ``p`` is its penetration, ``push`` a force out of the wall. A law is a
 function of p and of the rate of p, which the controller knows as a backward difference.
 """
 
@@ -24,7 +24,7 @@ class Tap(NamedTuple):
     speed: float
 
     def taken_J(self) -> float:
-        """What the wall took by the ways from tick to tick, each push times the way that follows it."""
+        """The energy that the wall took: each push times the displacement to the next tick, summed."""
         ways = [after - before for before, after in pairwise(self.depth[:-1])]
         return math.fsum(push * way for push, way in zip(self.push, ways, strict=False))
 
@@ -47,12 +47,12 @@ def damped(stiffness: float, damping: float) -> Law:
 
 
 def crossley(stiffness: float, factor: float, exponent: float, depth: float) -> Law:
-    """Hunt and Crossley's, whose stiffness at rest is given at one depth."""
+    """The law of Hunt and Crossley, with its stiffness at rest given at one depth."""
     return lambda p, rate: max(0.0, stiffness * depth ** (1 - exponent) * p**exponent * (1 + factor * rate))
 
 
 def ridged(stiffness: float, force: float, spacing: float) -> Law:
-    """A spring with ridges of parabolas: up from 0 to 0 in one half of each, down and back in the other."""
+    """A spring with ridges of parabolas: in one half of each up from 0 and back, in the other half down and back."""
 
     def push(p: float, _rate: float) -> float:
         u = math.fmod(p, spacing) / spacing

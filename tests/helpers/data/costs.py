@@ -1,4 +1,4 @@
-"""A cost.json as it might be, made up from the theory of each method, for tests of what shows it."""
+"""A cost.json as it might be, made up from the theory of each method, for tests of the code that shows it."""
 
 from haploop.tools.cost.data import AlikeScene, Cost, Errors, Load, Point, ReferenceNote, SceneCost, Spread, Step
 
@@ -20,7 +20,7 @@ SCENES = {
     "stiff_cable": ("A stiff cable", True, 1e-14, 20.0),
     "all_effects": ("All effects at once", True, 4e-13, 10.0),
 }
-# Half of the interval of the mean swing, which the errors of some methods exceed.
+# Half the interval of the mean swing, which the errors of some methods exceed.
 DOUBT_M = 1e-4
 FAILS = {("stiff_cable", "euler"): 20_000, ("stiff_cable", "rk4"): 5_000, ("stiff_cable", "semi-implicit-euler"): 5_000}
 

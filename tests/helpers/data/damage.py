@@ -1,4 +1,4 @@
-"""Damage as disks, transfers and people do it: seeded, to the bytes of a file or to the file as a whole."""
+"""Damage as disks, transfers and people cause it: seeded, to the bytes of a file or to the file as a whole."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def flip_bits(rng: random.Random, data: bytes, count: int = 0) -> bytes:
 
 
 def replace_byte(rng: random.Random, data: bytes) -> bytes:
-    """One byte becomes another that text is made of."""
+    """One byte becomes another that may occur in text."""
     at = rng.randrange(len(data))
     return data[:at] + rng.choice("0123456789.-+eE\"'[]{}=,:# \nnaN").encode() + data[at + 1 :]
 
@@ -45,7 +45,7 @@ def leave_out(rng: random.Random, data: bytes) -> bytes:
 
 
 def swap(rng: random.Random, data: bytes) -> bytes:
-    """Two pieces change places."""
+    """Two pieces are exchanged."""
     a, b, c, d = sorted((*_slice(rng, data), *_slice(rng, data)))
     return data[:a] + data[c:d] + data[b:c] + data[a:b] + data[d:]
 

@@ -1,9 +1,9 @@
-"""Damaged files of real runs put before every command that reads them.
+"""Damaged files of real runs given to every command that reads them.
 
-The claim: exit 0 with the numbers of the undamaged file, or with fewer ticks and a word about it; or another exit
-status and a sentence. Never a traceback, a wrong number, a hang, or a write to what is read.
+The claim: exit 0 with the numbers of the undamaged file, or with fewer ticks and a message about it; or another exit
+status and a sentence. Never a traceback, a wrong number, a hang, or a write to the files that are read.
 
-``PYTHONPATH=tests python -m helpers.data.damaged_run FIRST END`` tries some seeds and tells of each that breaks it.
+``PYTHONPATH=tests python -m helpers.data.damaged_run FIRST END`` tries some seeds and reports each that breaks it.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from helpers.live.in_process import ask
 
 SCENE = Path(__file__).parents[3] / "launch" / "scenes" / "swap.toml"
 _SHORT = ("duration=0.4", "event.0.at=0.2", "encoder.resolution=1e-5", "run.verdict=window")
-# Of a summary, what differs from run to run.
+# Keys of a summary that differ from run to run.
 _OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions", "figure")
-# A word that less was read than there may have been.
+# Words that say that less was read than there may have been.
 _SAID = ("cut off", "damaged")
 
 COMMANDS: dict[str, Callable[[Path, Path], list[str]]] = {
@@ -44,7 +44,7 @@ COMMANDS: dict[str, Callable[[Path, Path], list[str]]] = {
 
 
 class DamagedRuns:
-    """A short run with a swap in it and a log of many chunks, and what every command says of it undamaged."""
+    """A short run with a swap in it and a log of many chunks, and what every command says about it undamaged."""
 
     def __init__(self, directory: Path) -> None:
         self._run, self._at = directory / "undamaged", directory / "tried"
@@ -58,7 +58,7 @@ class DamagedRuns:
         self._told: dict[str, Any] = {}
 
     def _ask(self, name: str) -> tuple[Any, Any]:
-        """The answer to a command about a copy of the run, damaged or not, and what it gave, to be compared."""
+        """The answer to a command about a copy of the run, damaged or not, and its results, to be compared."""
         out = self._at / "out"
         out.mkdir(parents=True, exist_ok=True)
         run = self._at / "run"
@@ -88,7 +88,7 @@ class DamagedRuns:
             shutil.rmtree(self._at)
         shutil.copytree(self._run, self._at / "run")
         file = self._at / "run" / rng.choice(["log.mcap"] * 3 + ["scene.toml", "summary.json"])
-        if file.name == "log.mcap" and rng.random() < 0.3:  # that of a killed run
+        if file.name == "log.mcap" and rng.random() < 0.3:  # as of a killed run
             content = file.read_bytes()
             file.write_bytes(content[: rng.randrange(9, len(content))])
         how = damage(rng, file)
@@ -103,9 +103,9 @@ class DamagedRuns:
         return f"{name} with {file.name}: {how}", fault
 
     def _unlike(self, name: str, given: Any, said: bool, is_scene: bool) -> str:
-        """What is wrong with an answer, held against that of the undamaged run.
+        """What is wrong with an answer, compared with that for the undamaged run.
 
-        A scene alone has no checksum: whoever changes it has another one.
+        A scene alone has no checksum: if it is changed, it is another scene.
         """
         whole = self._told[name]
         if given == whole or (is_scene and name in ("check", "explain")):
@@ -125,7 +125,7 @@ def _columns(lines: list[str]) -> dict[str, list[str]]:
 
 
 def _digests(directory: Path) -> dict[str, str]:
-    """What the files of a run hold; not its figure, which is drawn into it."""
+    """Digests of the files of a run; not of its figure, which is drawn into its directory."""
     files = (path for path in directory.rglob("*") if path.is_file() and path.name != "figure.png")
     return {path.name: "" if path.is_symlink() else hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 

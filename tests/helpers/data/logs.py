@@ -1,4 +1,4 @@
-"""Logs made in the tests: what a run with a swap in it leaves behind, with numbers that are hard to carry over."""
+"""Logs made in the tests: what a run with a swap in it leaves behind, with numbers that are hard to convert."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ PLANT = {"timestamp": "s", "t": "s", "x": "m", "v": "m/s", "force": "N"}
 BEFORE = {"timestamp": "s", "x": "m", "wall": "N", "dissipation.0": "N", "in_contact": ""}
 AFTER = {"timestamp": "s", "x": "m", "wall": "N", "dissipation.0": "N", "dissipation.1": "N", "in_contact": ""}
 SCENE = 'title = "µ"\n'.encode()
-# Subnormal, negative zero, shortest at 17 digits, extreme, and what is no finite number.
+# Subnormal, negative zero, shortest at 17 digits, extreme, and not finite.
 HARD = np.array([5e-324, -0.0, 0.1 + 0.2, 1.7976931348623157e308, -1e-7, 1e16, np.nan, np.inf, -np.inf])
 
 
@@ -65,7 +65,7 @@ def cut(run: Path, share: float) -> None:
 
 
 def same_bits(a: np.ndarray, b: np.ndarray) -> bool:
-    """Tells whether two arrays of float64 agree in every bit; any NaN is as good as another."""
+    """Tells whether two arrays of float64 agree in every bit; all NaNs count as equal."""
     a, b = np.ascontiguousarray(a), np.ascontiguousarray(b)
     equal = (a.view(np.uint64) == b.view(np.uint64)) | (np.isnan(a) & np.isnan(b))
     return a.dtype == b.dtype == np.float64 and a.shape == b.shape and bool(equal.all())

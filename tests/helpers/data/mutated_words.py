@@ -1,6 +1,6 @@
-"""Command lines as typing, shells and scripts spoil them: seeded mutations of ones that are in order.
+"""Command lines as typing, shells and scripts spoil them: seeded mutations of correct ones.
 
-``PYTHONPATH=tests python -m helpers.data.mutated_words FIRST END`` tries some seeds and tells of each that breaks.
+``PYTHONPATH=tests python -m helpers.data.mutated_words FIRST END`` tries some seeds and reports each that breaks.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from helpers.live.in_process import Answer, ask
 from helpers.scenes.brake import source
 
 SCENE = Path(__file__).parents[3] / "launch" / "scenes" / "fig6c.toml"
-# What stands in place of a word or of its value.
+# Replacements for a word or its value.
 _ODD = (
     "", " ", "-", "--", "=", "==", "0", "-1", "1e308", "-1e308", "nan", "inf", "1e-320", "99999999999999999999", "0x10",
     "1_0", "true", "[]", "{}", "[[[]]]", '"', "'", "\n", "\0", "\udce9", "µ", "1 µm", "1 N/mm", "5 s", "1 parsec", "٣",
@@ -66,7 +66,7 @@ def replace(rng: random.Random, words: list[str]) -> None:
 
 
 def replace_value(rng: random.Random, words: list[str]) -> None:
-    """Of KEY=VALUE the one or the other."""
+    """Replaces the key or the value of KEY=VALUE."""
     at = rng.randrange(len(words))
     key, equals, value = words[at].partition("=")
     words[at] = rng.choice(
@@ -108,7 +108,7 @@ class MutatedWords:
         assert not made.status, made
 
     def attempt(self, seed: int) -> tuple[list[str], Answer]:
-        """Mutates a command line, in one of six also the recording, and runs it."""
+        """Mutates a command line, in one of five cases also the recording, and runs it."""
         rng = random.Random(seed)
         words = shlex.split(rng.choice(LINES))
         for _ in range(rng.choice([1, 1, 1, 2])):

@@ -1,4 +1,4 @@
-"""Recordings made in the tests: text files of motions with known energies, and what is made of them."""
+"""Recordings made in the tests: text files of motions with known energies, and the outcomes of booking them."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def outcome(path: Path, *, delay_s: float | None = None, layout: Layout | None =
 
 
 def true_J(path: Path, layout: Layout | None = None) -> float:
-    """What 2.7 N s/m of damping would have taken."""
+    """The energy that 2.7 N s/m of damping would have taken."""
     return outcome(path, layout=layout, dampings=["2.7"]).elements[0].true_J
 
 
 def booking(
     delay_s: float, *, recorded: frozenset[str] = frozenset(), period_s: float = PERIOD_S, **selection: Any
 ) -> Booking:
-    """An account of elements on samples that are handed to it."""
+    """The booking of elements on samples that are passed to it."""
     scene = make_scene_for_text(Selection(**selection), Path("made.csv"), period_s, recorded, KINDS)
     return Booking(scene, period_s, delay_s, KINDS, recorded)
 

@@ -27,13 +27,13 @@ Result = dict[str, Any]
 
 
 def cells_of(axes: Mapping[str, Sequence[Any]], seeds: int = 1) -> list[dict[str, Any]]:
-    """A dict of every cell: the axes' values by key, and the seed."""
+    """A dict for every cell: the axes' values by key, and the seed."""
     values = itertools.product(*axes.values(), range(1, seeds + 1))
     return [dict(zip([*axes, "seed"], cell, strict=True)) for cell in values]
 
 
 def ran(axes: Mapping[str, Sequence[Any]], scene_of: Callable[[dict[str, Any]], Scene], seeds: int = 1) -> MapData:
-    """The map of scenes that are run, in arrays where they can."""
+    """The map of scenes that are run, in arrays where possible."""
     cells = cells_of(axes, seeds)
     scenes = [scene_of(cell) for cell in cells]
     results = run_batch(scenes, KINDS, energy=False)
@@ -47,7 +47,7 @@ def table(
     scenes: Sequence[Scene | None],
     title: str = "a sweep",
 ) -> MapData:
-    """The map of results that are given: summaries, or ``ended`` and ``why`` alone."""
+    """The map of given results: summaries, or ``ended`` and ``why`` alone."""
     columns: dict[str, list[Any]] = {key: [cell[key] for cell in cells] for key in [*axes, "seed"]}
     columns["cell"] = [*range(len(cells))]
     columns["verdict"] = [result.get("verdict") for result in results]
@@ -63,7 +63,7 @@ def table(
 
 
 def said(verdict: str | None, oscillation_m: float | None = None) -> Result:
-    """A result with a verdict; one that failed where there is none."""
+    """A result with a verdict; a failed one if there is none."""
     if verdict is None:
         return {"ended": "failed", "why": "A plugin raised."}
     return {"verdict": verdict, "window": {"oscillation_m": oscillation_m}}

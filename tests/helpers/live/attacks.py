@@ -1,6 +1,6 @@
 """Frames that an unknown peer, a broken node or a typing error may send to the sockets of a run.
 
-As a script, ``attacks.py DIRECTORY``: send junk to all sockets there as fast as they take it, until ended.
+As a script, ``attacks.py DIRECTORY``: sends junk to all sockets there as fast as they take it, until ended.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ import zmq
 
 PUBLISHERS = ("plant", "controller", "logger")
 SOCKETS = ("clock", "loop", *PUBLISHERS)
-# An XSUB keeps a long subscription as a tree so deep that libzmq cannot take it down again; theirs is short.
+# An XSUB keeps a long subscription as a tree so deep that libzmq cannot free it again; its limit is therefore low.
 TOO_LARGE = {zmq.DEALER: 5 * 1024 * 1024, zmq.PUB: 5 * 1024 * 1024, zmq.XSUB: 5 * 1024}
 MAX_WHOLE, MIN_WHOLE = 2**64 - 1, -(2**63)
-# A test gives up after so long.
+# Time after which a test gives up.
 _PATIENCE_MS = 120_000
 
 
@@ -37,7 +37,7 @@ def pack(*items: Any) -> bytes:
 
 
 def junk(seed: int = 1) -> list[bytes]:
-    """Frames that are no messages: garbage, other versions, unknown codes, wrong, missing and surplus fields."""
+    """Frames that are not messages: garbage, other versions, unknown codes, wrong, missing and surplus fields."""
     dice = random.Random(seed)
     good = [
         pack(1, 6, 5, {}),
@@ -61,7 +61,7 @@ def junk(seed: int = 1) -> list[bytes]:
 
 
 def out_of_place() -> list[bytes]:
-    """Good messages from somebody who may not send them."""
+    """Valid messages from a peer that may not send them."""
     return [
         pack(1, 2, "run", {}, {}, {}, 0, {}),
         pack(1, 4, 0),
@@ -118,7 +118,7 @@ def impossible_commands() -> Iterator[tuple[Any, Any]]:
 
 
 class Stranger:
-    """A DEALER that speaks to one socket of a run and hears what comes back."""
+    """A DEALER that sends to one socket of a run and receives the replies."""
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], path: Path) -> None:
         self.socket = context.socket(zmq.DEALER)
@@ -132,16 +132,16 @@ class Stranger:
         self.socket.close(0)
 
     def ask(self, *frames: bytes) -> list[Any]:
-        """Send one message and return the answer: its code and fields."""
+        """Sends one message and returns the answer: its code and fields."""
         self.socket.send_multipart(frames)
         assert self.socket.poll(_PATIENCE_MS), f"no answer to {frames!r:.200}"
         return msgpack.unpackb(self.socket.recv(), strict_map_key=False)[1:]
 
 
 def send_unasked(context: zmq.Context[zmq.Socket[bytes]], path: Path) -> list[zmq.Socket[bytes]]:
-    """Junk, messages out of place, oversized ones and no ZeroMQ at all to one socket of a run.
+    """Sends junk, messages out of place, oversized ones and bytes that are not ZeroMQ to one socket of a run.
 
-    Returns the sockets, still open, so that the sending goes on while the run does.
+    Returns the sockets, still open, so that the sending continues while the run does.
     """
     topics = (path.stem.encode(), b"", b"junk", b"\xff")
     frames = [pack(1, 20, "0" * 32), *false_joins(), *out_of_place(), *junk(), pack(1, 22, 0, [MAX_WHOLE] * 10_000)]
@@ -159,12 +159,12 @@ def send_unasked(context: zmq.Context[zmq.Socket[bytes]], path: Path) -> list[zm
 
 
 def _send(sender: zmq.Socket[bytes], frames: list[bytes]) -> None:
-    with suppress(zmq.Again):  # its queue is full: enough has been said
+    with suppress(zmq.Again):  # its queue is full: enough has been sent
         sender.send_multipart(frames, zmq.DONTWAIT)
 
 
 def no_zeromq(path: Path) -> None:
-    """Raw bytes instead of a ZeroMQ greeting, all of a greeting but its end, and nothing at all."""
+    """Sends raw bytes instead of a ZeroMQ greeting, a greeting without its end, and nothing at all."""
     greeting = b"\xff" + bytes(8) + b"\x7f\x03\x00NULL" + bytes(48)
     for data in (os.urandom(2000), b"GET / HTTP/1.1\r\n\r\n", greeting[:20], greeting, greeting + os.urandom(500), b""):
         with socket.socket(socket.AF_UNIX) as raw, suppress(OSError):  # not listening yet, or thrown out already
@@ -173,7 +173,7 @@ def no_zeromq(path: Path) -> None:
 
 
 def flood(directory: Path) -> None:
-    """Junk to all sockets without end."""
+    """Sends junk to all sockets without end."""
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     frames = [*junk(), *out_of_place()]
     senders = []

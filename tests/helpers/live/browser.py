@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from helpers.live.stand_in import StandIn
 
-# Names on the path and options of each. Chromium: nothing is fetched, synchronised or reported, so what the page asks
-# for is all that is asked for. Firefox: the one that is installed, driven by WebDriver BiDi.
+# Names on the path and options of each. Chromium: nothing is fetched, synchronised or reported, so that all requests
+# come from the page. Firefox: the one that is installed, driven by WebDriver BiDi.
 BROWSERS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "chromium": (
         ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"),
@@ -30,7 +30,7 @@ BROWSERS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
 IN_BOTH = pytest.mark.parametrize(
     "browser", ["chromium", pytest.param("firefox", marks=pytest.mark.slow)], indirect=True
 )
-# What a browser says because of what a test does: it stops a server, and reads the pixels of a chart.
+# Messages of a browser that are caused by a test, which stops a server and reads the pixels of a chart.
 OF_THE_TEST = (
     "ERR_CONNECTION_", "ERR_EMPTY_RESPONSE", "before receiving a handshake response", "willReadFrequently",
     "establish a connection to the server at ws:", "was interrupted while the page was loading",
@@ -38,7 +38,7 @@ OF_THE_TEST = (
 DESK = {"width": 1280, "height": 720}
 PHONE = {"width": 390, "height": 844}
 
-# Resolves when a few frames have been drawn and nothing fades or moves any more.
+# Resolves when a few frames have been drawn and nothing fades or moves.
 STILL = """() => new Promise(done => {
     let frames = 0;
     const look = () => {
@@ -48,7 +48,7 @@ STILL = """() => new Promise(done => {
     };
     requestAnimationFrame(look);
 })"""
-# Whether a colour (r, g, b) is nearly there in a column of pixels of a chart, at parts (0 .. 1) of its plot's width.
+# Heights at which about a colour (r, g, b) is seen in a column of pixels of a chart, at parts (0 .. 1) of its width.
 SEEN = """([chart, parts, colour]) => {
     const canvas = document.querySelector(`#${chart} canvas`);
     const over = document.querySelector(`#${chart} .u-over`);
@@ -78,7 +78,7 @@ RGB = """name => {
 
 
 def free_port() -> int:
-    """A port that the system gives to nobody by itself, so that it can be left and taken again."""
+    """A port that the system does not assign on its own, so that it can be freed and taken again."""
     while True:
         with socket.socket() as tried, suppress(OSError):
             tried.bind(("127.0.0.1", random.randrange(10_000, 30_000)))
@@ -86,7 +86,7 @@ def free_port() -> int:
 
 
 def still(page: Page) -> None:
-    """Wait until the page looks as it will stay."""
+    """Waits until the look of the page no longer changes."""
     page.evaluate(STILL)
 
 
@@ -96,7 +96,7 @@ def is_complaint(text: str) -> bool:
 
 
 def order(stand_in: StandIn, page: Page, act: Callable[[], object]) -> tuple[str, dict[str, Any]]:
-    """Returns verb and arguments of what is ordered by ``act``; the page has heard the answer."""
+    """Returns verb and arguments of the command that ``act`` causes; the page has received the answer."""
     from playwright.sync_api import expect
 
     page.evaluate("document.querySelector('#said').textContent = ''")
@@ -106,12 +106,12 @@ def order(stand_in: StandIn, page: Page, act: Callable[[], object]) -> tuple[str
 
 
 def seen(page: Page, chart: str, parts: list[float], name: str) -> list[tuple[float, float] | None]:
-    """First and last height (0 top .. 1 bottom) at which a colour stands at some parts of the width; None for none."""
+    """First and last height (0 top .. 1 bottom) at which a colour is seen at some parts of the width; None for none."""
     return page.evaluate(SEEN, [chart, parts, page.evaluate(RGB, name)[:3]])
 
 
 def settled(page: Page, chart: str, text: str) -> None:
-    """Wait until a chart's legend says so: then the snapshot is drawn."""
+    """Waits until a chart's legend contains a text: then the snapshot is drawn."""
     from playwright.sync_api import expect
 
     expect(page.locator(f"#{chart} .legend")).to_contain_text(text)

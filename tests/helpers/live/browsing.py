@@ -1,4 +1,4 @@
-"""A server of the live page, and what a page in a browser does with it."""
+"""A server of the live page, and the part of a page in a browser."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from helpers.live.launched import PATIENCE_S
 
 
 def to_its_end(work: Coroutine[Any, Any, Any]) -> Any:
-    """Runs a coroutine to its end on a thread of its own: a browser of other tests may keep a loop on this one."""
+    """Runs a coroutine to its end on a separate thread: a browser of other tests may keep an event loop on this one."""
     with ThreadPoolExecutor(1) as thread:
         return thread.submit(asyncio.run, work).result()
 
 
 class NoRuns:
-    """A place where nothing runs; remembers what it was asked."""
+    """A place where nothing runs; it records what it was asked."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[str, Any]] = []
@@ -79,9 +79,9 @@ class Tab:
     """A page that is connected.
 
     Attributes:
-        state, events: as told last; None before.
-        snapshot: the last one, decoded; None before. ``is_whole``: with what stands beside the charts.
-        snapshots: how many have come.
+        state, events: as last received; None before.
+        snapshot: the last one, decoded; None before. ``is_whole``: with the data beside the charts.
+        snapshots: how many have been received.
         closed: (code, reason) once the server has closed.
     """
 
@@ -114,14 +114,14 @@ class Tab:
         self.closed = self.socket.close_code, reason
 
     def _take(self, now: dict[str, Any]) -> None:
-        """Keeps what stood beside the charts before, where this snapshot comes without."""
+        """Keeps the earlier data beside the charts where this snapshot comes without any."""
         self.is_whole = now["beside"]
         if not self.is_whole:
             now = {**self.snapshot, **now, "tables": {**self.snapshot["tables"], **now["tables"]}}
         self.snapshot, self.snapshots = now, self.snapshots + 1
 
     async def until(self, what: str, look: Callable[[], Any]) -> Any:
-        """The first true answer of ``look``."""
+        """The first true result of ``look``."""
         give_up = asyncio.get_running_loop().time() + PATIENCE_S
         while not (found := look()):
             assert asyncio.get_running_loop().time() < give_up, f"{what} has not come; the state is {self.state}"
@@ -129,13 +129,13 @@ class Tab:
         return found
 
     async def phase(self, phase: str) -> dict[str, Any]:
-        """Wait for a phase; returns the state."""
+        """Waits for a phase; returns the state."""
         return await self.until(
             f"phase {phase}", lambda: self.state if (self.state or {}).get("phase") == phase else None
         )
 
     async def watch(self, **what: Any) -> dict[str, Any]:
-        """Watch something; returns the first snapshot that shows it."""
+        """Watches something; returns the first snapshot that shows it."""
         await self.socket.send_json({"type": "watch", **what})
         seen, span_s, end_s = self.snapshots, what.get("span_s"), what.get("end_s")
 
@@ -151,11 +151,11 @@ class Tab:
         return self.snapshot
 
     async def ask(self, verb: str, **arguments: Any) -> tuple[bool, str]:
-        """A command; returns whether it was done, and the answer."""
+        """Sends a command; returns whether it was done, and the answer."""
         return await self.send(verb, arguments, self.token)
 
     async def send(self, verb: str, arguments: dict[str, Any], token: str) -> tuple[bool, str]:
-        """A command with some token."""
+        """Sends a command with some token."""
         self._asked += 1
         number = self._asked
         await self.socket.send_json(
@@ -166,7 +166,7 @@ class Tab:
 
 
 class Site:
-    """A server and a browser's way to it."""
+    """A server and a browser's access to it."""
 
     def __init__(self, guard: Guard, session: aiohttp.ClientSession) -> None:
         self.guard, self.session = guard, session
@@ -177,7 +177,7 @@ class Site:
         return self.guard.address.rstrip("/")
 
     async def stream(self, **headers: str) -> aiohttp.ClientWebSocketResponse:
-        """Open the page's stream."""
+        """Opens the page's stream."""
         self._streams.append(await stream(self.session, self.address, **headers))
         return self._streams[-1]
 
@@ -186,7 +186,7 @@ class Site:
         return Tab(await self.stream(**headers), self.guard.token)
 
     def close(self) -> None:
-        """Close all that is open still."""
+        """Closes everything that is still open."""
         for stream in self._streams:
             stream._response.close()
 
@@ -215,6 +215,6 @@ async def site(runs: Runs | None = None, **options: Any) -> AsyncIterator[Site]:
 
 
 async def status(site: Site, path: str, **headers: str) -> int:
-    """The status of an answer to a request."""
+    """The HTTP status of the answer to a request."""
     async with site.session.get(f"{site.address}{path}", headers=headers, allow_redirects=False) as answer:
         return answer.status

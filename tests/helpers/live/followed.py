@@ -1,4 +1,4 @@
-"""Real runs that a page of a server follows, and what the page comes to hold of them."""
+"""Real runs that a page of a server follows, and the data that the page receives of them."""
 
 import asyncio
 
@@ -13,7 +13,7 @@ TOUCHING = ("wall.position=-0.001", "duration=600")
 
 
 def follow(play, tmp_path, *overrides, options=None, **how):
-    """A run, a server, and a page that plays its part: ``play(run, tab, site)``."""
+    """Starts a run, a server, and a page, and plays a scenario with them: ``play(run, tab, site)``."""
 
     async def scenario(run):
         async with site(**(options or {})) as here:
@@ -24,12 +24,12 @@ def follow(play, tmp_path, *overrides, options=None, **how):
 
 
 async def stands(run, tick):
-    """Wait until the run stands still at a tick."""
+    """Waits until the run stands still at a tick."""
     await asyncio.to_thread(run.stands_at, tick)
 
 
 async def has_logged(run, ticks):
-    """Wait until so many ticks can be read from the log."""
+    """Waits until ``ticks`` ticks can be read from the log."""
 
     def look():
         log = read(run.prepared.out)
@@ -39,12 +39,12 @@ async def has_logged(run, ticks):
 
 
 def same(column, truth):
-    """Every float32 that is nearest to a logged number, and nothing else."""
+    """Asserts that a column holds, for every logged number, the nearest float32, and nothing else."""
     np.testing.assert_array_equal(column, np.asarray(truth, np.float32))
 
 
 async def whole(tab, run, ticks, **watch):
-    """A snapshot of everything since the start, once all three streams of it are there."""
+    """A snapshot of everything since the start, once all three of its streams are there."""
     begins = {"position": "x", "force": "total", "energy": "residual"}
     await tab.until("the end", lambda: tab.state and tab.state.get("tick", 0) >= ticks)
     await tab.watch(**{"span_s": None, "points": 8000} | watch)

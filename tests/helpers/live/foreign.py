@@ -1,4 +1,4 @@
-"""Runs of figure 6(c) whose controller is a program of somebody else's, the plain one of the oracles."""
+"""Runs of figure 6(c) whose controller is a foreign program, the plain one of the oracles."""
 
 from __future__ import annotations
 

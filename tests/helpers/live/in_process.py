@@ -1,4 +1,4 @@
-"""Commands in this process, through their ``main``, with a limit of time and everything they printed."""
+"""Commands in this process, through their ``main``, with a time limit and all their output."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from haploop.tools.cli.main import main
 
 
 class Hung(BaseException):
-    """A command took longer than it may."""
+    """A command took longer than allowed."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer to a command: its exit status and texts; ``fault`` is the traceback of one that has none."""
+    """The answer to a command: its exit status and texts; ``fault`` is the traceback of one without a status."""
 
     status: int
     stdout: str
@@ -28,7 +28,7 @@ class Answer:
     fault: str
 
     def broken(self) -> str:
-        """Returns what is wrong with an answer whatever was asked; "" for one that is in order."""
+        """Returns what is wrong with an answer, whatever was asked; "" for a valid one."""
         if self.fault:
             return self.fault
         if "Traceback" in self.stderr:
@@ -39,7 +39,7 @@ class Answer:
         return "it failed without a word" if self.status and not said else ""
 
 
-# Standing still for so many times as long as a command may compute is no matter of a busy machine either.
+# Wall time over the limit of computing time, beyond which a command hangs even if the machine is busy.
 _WAITING = 10.0
 
 

@@ -1,4 +1,4 @@
-"""Runs as a user starts them, in a process of their own, and what a test sees of them from outside."""
+"""Runs as a user starts them, each in its own process, and what a test sees of them from outside."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from haploop.protocol.transport.messages import PROCESSES
 SCENES = Path(__file__).parents[3] / "launch/scenes"
 SCENE = SCENES / "fig6c.toml"
 HAPLOOP = [sys.executable, "-m", "haploop.tools.cli"]
-# A test gives up after so long. It says nothing about how long anything may take.
+# Time after which a test gives up. It does not imply how long anything may take.
 PATIENCE_S = 120.0
-# Nobody is silent for so long, however busy the machine; the deadline of every run that no test is about.
+# No process is silent for so long, however busy the machine; the deadline of every run whose deadline is not tested.
 PATIENT = "run.deadline=30"
-# Of a run with somebody who is silent for good: long enough that nobody else is blamed for a busy machine.
+# For a run with a process that stays silent: long enough that no other process is blamed on a busy machine.
 BRIEF_S = 3
 BRIEF = f"run.deadline={BRIEF_S}"
-# So long that it surely goes on while a test does something to it.
+# So long that the run surely continues while a test does something to it.
 LONG = ("duration=600",)
-# Its processes start, and its first tick does not come.
+# The processes start, but the first tick does not come.
 AT_REST = (*LONG, "event=[{at=0, pause=true}]")
 PACE = ("--pace", "5")
 ROLES = tuple(PROCESSES)
 
 
 def first_and_slowly(*values: Any) -> list[Any]:
-    """Parameters of a test, of which all but the first are left to the slow tests; a tuple is several parameters."""
+    """Parameters of a test, all but the first for the slow tests only; a tuple is several parameters."""
     rest = [value if isinstance(value, tuple) else (value,) for value in values[1:]]
     return [values[0], *(pytest.param(*value, marks=pytest.mark.slow) for value in rest)]
 
@@ -49,7 +49,7 @@ Row = tuple[int, int, str, str]
 
 
 def wait_for(what: str, look: Callable[[], Any]) -> Any:
-    """The first true answer of ``look``."""
+    """The first true result of ``look``."""
     give_up = time.monotonic() + PATIENCE_S
     while not (answer := look()):
         assert time.monotonic() < give_up, f"{what} has not come within {PATIENCE_S:g} s"
@@ -58,7 +58,7 @@ def wait_for(what: str, look: Callable[[], Any]) -> Any:
 
 
 def processes() -> list[Row]:
-    """(pid, parent, state, command line) of every process there is; ``-ww`` cuts no line at a terminal's width."""
+    """(pid, parent, state, command line) of every process; with ``-ww`` no line is cut at a terminal's width."""
     listing = subprocess.run(
         ["ps", "-A", "-ww", "-o", "pid=,ppid=,stat=,args="], capture_output=True, text=True, check=True
     )
@@ -67,12 +67,12 @@ def processes() -> list[Row]:
 
 
 def alive(pids: Sequence[int]) -> list[int]:
-    """Returns those of these processes that are still there; one that only waits to be reaped is gone."""
+    """Returns those of these processes that still exist; one that only waits to be reaped does not count."""
     return [pid for pid, _, state, _ in processes() if pid in pids and not state.startswith("Z")]
 
 
 def processes_of(place: Path) -> list[int]:
-    """Returns the processes that live with this place for live runs, by their environment (Linux)."""
+    """Returns the processes whose environment names this directory for live runs (Linux)."""
     found, mark = [], f"XDG_RUNTIME_DIR={place}\0".encode()
     for path in Path("/proc").glob("[0-9]*/environ"):
         with contextlib.suppress(OSError):
@@ -81,7 +81,7 @@ def processes_of(place: Path) -> list[int]:
 
 
 def pending(pid: int) -> bool:
-    """Tells whether a signal waits until the process gets processor time (Linux)."""
+    """Tells whether a signal is waiting for the process to get processor time (Linux)."""
     status = Path(f"/proc/{pid}/status")
     lines = status.read_text(encoding="utf-8").splitlines() if status.exists() else []
     return any(int(line.split()[1], 16) for line in lines if line.startswith(("SigPnd", "ShdPnd")))
@@ -95,12 +95,12 @@ def where(pid: int) -> str:
 
 
 def command(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """A haploop command from another terminal, to its end."""
+    """Runs a haploop command to its end, as from another terminal."""
     return subprocess.run([*HAPLOOP, *arguments], capture_output=True, text=True, timeout=PATIENCE_S)
 
 
 def on_a_disk_of(size_bytes: int, command: list[str]) -> list[str]:
-    """The command as on a disk that is full after so many bytes: every write beyond fails, in its children too."""
+    """The command as on a disk that is full after ``size_bytes``: every write beyond fails, in its children too."""
     limit = "import os, resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)"
     return [sys.executable, "-c", f"{limit}; os.execv(sys.argv[2], sys.argv[2:])", str(size_bytes), *command]
 
@@ -134,20 +134,20 @@ class Launched:
 
     @property
     def stderr(self) -> str:
-        """Its standard error so far, with that of its nodes."""
+        """Its standard error so far, including that of its nodes."""
         return os.pread(self._said.fileno(), 1_000_000, 0).decode()
 
     def says(self, words: str) -> None:
-        """Wait until it has said something."""
+        """Waits until its standard error contains some words."""
         wait_for(words, lambda: words in self.stderr)
 
     def signal(self, number: signal.Signals) -> None:
-        """Send the process itself a signal."""
+        """Sends a signal to the process itself."""
         self._since = time.monotonic()
         self._process.send_signal(number)
 
     def stood_for(self, seconds: float) -> bool:
-        """Tells whether so much time has gone since the last signal."""
+        """Tells whether that much time has passed since the last signal."""
         return time.monotonic() - self._since >= seconds
 
     def is_there(self) -> bool:
@@ -160,7 +160,7 @@ class Launched:
         return self._process.poll()
 
     def end(self, status: int | None) -> str:
-        """Wait for the end, which must come with this exit status; returns stdout."""
+        """Waits for the end, which must come with this exit status; returns stdout."""
         try:
             stdout, _ = self._process.communicate(timeout=PATIENCE_S)
         except subprocess.TimeoutExpired:
@@ -171,11 +171,11 @@ class Launched:
         return stdout
 
     def summary(self) -> dict[str, Any]:
-        """Wait for the end, which must be exit status 0; returns the summary that ``--json`` prints."""
+        """Waits for the end, which must be exit status 0; returns the summary that ``--json`` prints."""
         return json.loads(self.end(0))
 
     def clear_away(self) -> None:
-        """Leave no process behind, however the test went."""
+        """Leaves no process behind, however the test went."""
         for pid in (*self.nodes.values(), self.pid):
             if pid != self.pid or self._process.poll() is None:
                 try:
@@ -217,7 +217,7 @@ class Run(Launched):
         return wait_for("the run", lambda: next((r for r in run_directory.live_runs() if r.pid == self.pid), None))
 
     def nodes_started(self, *roles: str) -> None:
-        """Wait until there is a process for each role, by its command line, whatever it is doing."""
+        """Waits until there is a process for each role, by its command line, whatever it is doing."""
         modules = {role: PROCESSES[role].module for role in roles or ROLES}
 
         def look() -> bool:
@@ -230,11 +230,11 @@ class Run(Launched):
         wait_for(f"a process for {', '.join(modules)}", look)
 
     def ask(self, verb: str, **arguments: Any) -> dict[str, Any]:
-        """A command as from another terminal; returns the data of its answer."""
+        """Sends a command as from another terminal; returns the data of its answer."""
         return run_directory.ask(self.live, verb, **arguments)[1]
 
     def reaches(self, tick: int) -> int:
-        """Wait until all nodes have done the ticks before ``tick``; returns how far they are."""
+        """Waits until all nodes have done the ticks before ``tick``; returns how far they are."""
 
         def look() -> int:
             if self._process.poll() is not None:
@@ -247,7 +247,7 @@ class Run(Launched):
         return wait_for(f"tick {tick}", look)
 
     def has_logged(self, ticks: int) -> int:
-        """Wait until so many ticks can be read from the log while the run goes on; returns how many."""
+        """Waits until ``ticks`` ticks can be read from the log while the run continues; returns how many."""
         self.reaches(ticks)
 
         def look() -> int:
@@ -261,7 +261,7 @@ class Run(Launched):
         return read(self.out_directory)
 
     def stands(self, at: int | None = None) -> int:
-        """Wait until a paused run stands still, all nodes at the same tick (at ``at``, if given); returns it."""
+        """Waits until a paused run stands still, all nodes at the same tick (at ``at``, if given); returns it."""
 
         def look() -> int:
             data = self.ask("status")
@@ -272,12 +272,12 @@ class Run(Launched):
         return wait_for("standstill", look) - 1
 
     def send(self, role: str, number: signal.Signals) -> None:
-        """Send a node a signal."""
+        """Sends a signal to a node."""
         self._since = time.monotonic()
         os.kill(self.nodes[role], number)
 
     def leaves_nothing(self) -> None:
-        """No process of the run is left, and none of its sockets."""
+        """Asserts that no process of the run is left, and none of its sockets."""
         pids = [self.pid, *self.nodes.values()]
         wait_for("the end of all processes", lambda: not alive(pids))
         assert list(private_directory.base_directory().iterdir()) == []

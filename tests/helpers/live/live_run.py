@@ -1,4 +1,4 @@
-"""A run as processes that goes on while a test does something to it."""
+"""A run as processes that continues while a test does something to it."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ SCENE = Path(__file__).parents[3] / "launch" / "scenes" / "fig6c.toml"
 
 
 class Going:
-    """A run that a thread of this process leads.
+    """A run that a thread of this process controls.
 
     Attributes:
-        prepared: what is run.
-        live: as other terminals find it.
+        prepared: the specification of the run.
+        live: the run as other terminals find it.
     """
 
     def __init__(self, prepared: RunSpec, announced: Callable[[Path], object], options: dict[str, Any]) -> None:
@@ -63,11 +63,11 @@ class Going:
         return self.live.sockets / "run.json"
 
     def ask(self, verb: str, **arguments: Any) -> tuple[str, dict[str, Any]]:
-        """A command as from another terminal."""
+        """Sends a command as from another terminal."""
         return run_directory.ask(self.live, verb, **arguments)
 
     def stands_at(self, tick: int, paused: bool = True) -> None:
-        """Wait until the run stands still at ``tick``, every tick before it logged, on request or because it must."""
+        """Waits until the run stands still at ``tick``, every tick before it logged: paused, or because it must."""
 
         def stands() -> bool:
             data = self.ask("status")[1]
@@ -76,7 +76,7 @@ class Going:
         wait_for(f"standstill at tick {tick}", stands)
 
     def result(self) -> dict[str, Any]:
-        """The summary, when the run has ended."""
+        """The summary once the run has ended."""
         self._thread.join(PATIENCE_S)
         assert not self._thread.is_alive(), "the run does not end"
         if self._error:
@@ -84,7 +84,7 @@ class Going:
         return self._result
 
     def end(self) -> None:
-        """Leave nothing behind, however the test went."""
+        """Leaves nothing behind, however the test went."""
         if self._thread.is_alive():
             with suppress(run_directory.CommandRefused, run_directory.RunNotFound):
                 self.ask("stop")
@@ -113,5 +113,5 @@ def going(
 
 
 def undisturbed(prepared: RunSpec) -> dict[str, Any]:
-    """The summary of the same scene run in one process, with nobody watching."""
+    """The summary of the same scene run in one process, without observers."""
     return run_in_process(prepared.scene, prepared.kinds)

@@ -1,4 +1,4 @@
-"""Programs of examples/ as commands for ``--node``; where what they need is missing, a test is skipped."""
+"""Programs of examples/ as commands for ``--node``; a test is skipped where something they need is missing."""
 
 from __future__ import annotations
 

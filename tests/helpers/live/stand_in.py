@@ -1,4 +1,4 @@
-"""haploop view as the page sees it, without a run: serves the page, tells it what a test wants, hears what it says."""
+"""haploop view as the page sees it, without a run: serves the page, sends what a test wants, records its replies."""
 
 from __future__ import annotations
 
@@ -103,11 +103,11 @@ RUNS = {
 
 
 class StandIn:
-    """A server of the page in a thread of its own.
+    """A server of the page in a separate thread.
 
     Attributes:
         received: every message of the page, in order.
-        answer: gives (ok, text) for a command.
+        answer: returns (ok, text) for a command.
         url: the link to open, token included.
     """
 
@@ -118,7 +118,7 @@ class StandIn:
         self._snapshot: bytes | None = None
         self._sockets: set[web.WebSocketResponse] = set()
         self._sent = 0
-        # A page that has just come gets what was told before, then what is told meanwhile.
+        # A page that has just connected gets the earlier messages first, then those sent meanwhile.
         self._one_at_a_time = asyncio.Lock()
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever)
@@ -139,52 +139,52 @@ class StandIn:
         return [message for message in self.received if message["type"] == "command"]
 
     def watches(self) -> list[dict[str, Any]]:
-        """The stretches of time that were asked for."""
+        """The stretches of time that were requested."""
         return [message for message in self.received if message["type"] == "watch"]
 
     def asked(self, is_so: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        """The stretch of time that was asked for last, once it is so: what a page asks for takes its time to arrive."""
+        """The last stretch of time that was requested, once ``is_so`` accepts it: requests take time to arrive."""
         wait_for("the question", lambda: self.watches() and is_so(self.watches()[-1]))
         return self.watches()[-1]
 
     def ordered(self, is_so: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        """The last command, once it is so."""
+        """The last command, once ``is_so`` accepts it."""
         wait_for("the order", lambda: self.commands() and is_so(self.commands()[-1]))
         return self.commands()[-1]
 
     def drawn(self) -> None:
-        """Wait until every page has drawn the last snapshot that it was sent."""
+        """Waits until every page has drawn the last snapshot that it was sent."""
         said = lambda: sum(message["type"] == "drawn" for message in self.received)  # noqa: E731
         wait_for("the drawing", lambda: said() == self._sent)
 
     # From the test's thread
 
     def start(self) -> None:
-        """Serve, on the same port as before."""
+        """Serves, on the same port as before."""
         self._do(self._start())
 
     def stop(self) -> None:
-        """Be gone, as when haploop view is ended."""
+        """Stops serving, as when haploop view is ended."""
         self._do(self._stop())
 
     def close(self) -> None:
-        """End the thread, too."""
+        """Stops serving and ends the thread."""
         self.stop()
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
         self._loop.close()
 
     def tell(self, *messages: dict[str, Any]) -> None:
-        """Send messages to every page, and to those that come later the last of each type."""
+        """Sends messages to every page, and the last of each type to pages that connect later."""
         for message in messages:
             self._do(self._tell(message["type"], json.dumps(message)))
 
     def state(self, **changes: Any) -> None:
-        """A running loop, but for some changes."""
+        """Sends the state of a running loop, with some changes."""
         self.tell(RUNNING | changes)
 
     def show(self, snapshot: bytes) -> None:
-        """Send a snapshot to every page."""
+        """Sends a snapshot to every page."""
         self._do(self._show(snapshot))
 
     def _do(self, work: Any) -> None:
@@ -209,7 +209,7 @@ class StandIn:
         await web.TCPSite(self._runner, "127.0.0.1", self._port, reuse_address=True).start()
 
     async def _stop(self) -> None:
-        for site in [*self._runner.sites]:  # before the pages, which come again
+        for site in [*self._runner.sites]:  # before the pages, which reconnect
             await site.stop()
         for socket in list(self._sockets):
             await socket.close()

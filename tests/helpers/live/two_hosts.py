@@ -1,8 +1,8 @@
-"""Two hosts on one machine: network namespaces joined by a wire that delays, loses or cuts what goes through it.
+"""Two hosts on one machine: network namespaces joined by a wire that delays, loses or cuts off packets.
 
-The wire is a thread between two TUN devices. Where the kernel has netem, ``tc`` has it delay and lose packets at the
-devices, and the thread carries the rest; else the thread does, each IP packet by itself, as netem does, so that TCP
-retransmits what is lost.
+The wire is a thread between two TUN devices. Where the kernel has netem, ``tc`` makes it delay and lose packets at the
+devices, and the thread carries the rest; else the thread does so for each IP packet separately, as netem does, so that
+TCP retransmits what is lost.
 """
 
 from __future__ import annotations
@@ -48,14 +48,14 @@ class Wire:
     """The wire between host "a" and host "b".
 
     Args:
-        delay_s: of each packet, one way.
+        delay_s: delay of each packet, one way.
         loss: share of the packets that are lost.
-        is_by_netem: whether the kernel sees to both.
+        is_by_netem: whether the kernel does both.
 
     Attributes:
         by: what delays and loses packets.
-        is_cut: nothing comes through.
-        carried: packets so far.
+        is_cut: whether nothing gets through.
+        carried: number of packets carried so far.
     """
 
     def __init__(self, ends: tuple[int, int], delay_s: float, loss: float, is_by_netem: bool = False) -> None:
@@ -87,7 +87,7 @@ class Wire:
 
     @property
     def lost(self) -> int:
-        """Packets lost so far."""
+        """Number of packets lost so far."""
         return self._lost + sum(_dropped(host) for host in "ab")
 
     def close(self) -> None:
@@ -104,7 +104,7 @@ def on(host: str, command: list[str]) -> list[str]:
 
 @contextlib.contextmanager
 def two_hosts(delay_s: float = 0.0, loss: float = 0.0) -> Iterator[Wire]:
-    """Makes both hosts and their wire; afterwards none of it is left."""
+    """Makes both hosts and their wire, and removes them afterwards."""
     ends = []
     try:
         for host, own, own6 in (("a", A, A6), ("b", B, "fd77::2")):
@@ -117,7 +117,7 @@ def two_hosts(delay_s: float = 0.0, loss: float = 0.0) -> Iterator[Wire]:
             inside = ("-n", _name(host))
             _ip(*inside, "addr", "add", f"{own}/24", "dev", device)
             _ip(*inside, "addr", "add", f"{own6}/64", "dev", device, "nodad")
-            for name in (device, "lo"):  # a queue that holds a whole window of telemetry, or it would lose packets, too
+            for name in (device, "lo"):  # a queue for a whole window of telemetry, or packets are lost here
                 _ip(*inside, "link", "set", name, "txqueuelen", "20000", "up")
         is_by_netem = shutil.which("tc") is not None and all(_shape(host, delay_s, loss) for host in "ab")
         wire = Wire((ends[0], ends[1]), delay_s, loss, is_by_netem)
@@ -135,14 +135,14 @@ def _device(host: str) -> str:
 
 
 def _shape(host: str, delay_s: float, loss: float) -> bool:
-    """Has the kernel delay and lose what a host sends; tells whether it can."""
+    """Makes the kernel delay and lose what a host sends; tells whether it can."""
     netem = ["netem", "delay", f"{1e3 * delay_s}ms", "loss", f"{100 * loss}%", "limit", "100000"]
     words = ["tc", "-n", _name(host), "qdisc", "add", "dev", _device(host), "root", *netem]
     return subprocess.run(words, capture_output=True).returncode == 0
 
 
 def _dropped(host: str) -> int:
-    """Packets that the kernel has lost of what a host sent."""
+    """Number of packets sent by a host that the kernel has lost."""
     words = ["tc", "-n", _name(host), "-s", "-j", "qdisc", "show", "dev", _device(host)]
     said = subprocess.run(words, capture_output=True, text=True) if shutil.which("tc") else None
     found = json.loads(said.stdout or "[]") if said else []

@@ -1,4 +1,4 @@
-"""Another package, as somebody else would write it: by entry points an effect, an estimator, an integrator, a wall."""
+"""A package as others would write it: an effect, an estimator, an integrator and a wall by entry points."""
 
 from __future__ import annotations
 

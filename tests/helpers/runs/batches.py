@@ -44,7 +44,7 @@ def pressed(**tables: Any) -> Scene:
 
 
 def diverging() -> list[Scene]:
-    """Some of these swing up and away, each at its time; some do not."""
+    """Some of these diverge, each at a different time; some do not."""
     return [
         pressed(
             duration=0.6,
@@ -68,7 +68,7 @@ def with_element(made: Scene, kind: str, **parameters: float) -> Scene:
 
 
 class Stiffening(Element):
-    """Written for one loop alone: asks for the number itself."""
+    """Written for a single loop: needs the plain number."""
 
     kind = "stiffening"
     force_N: Annotated[float, Quantity("N", at_least=0)] = 0.05

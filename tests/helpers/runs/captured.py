@@ -21,7 +21,7 @@ class Captured:
     """A run kept whole.
 
     Attributes:
-        plant: x, v, force, command and what effects add at every step and at the end, shape (steps + 1,).
+        plant: x, v, force, command and columns of effects at every step and at the end, shape (steps + 1,).
         controller: x, v, a, wall, total, in_contact at every tick, shape (ticks,).
         forces: force of every element's book at every tick, 0 where it was not at work, shape (ticks,).
         summary: the run's summary.
@@ -59,7 +59,7 @@ class CapturingLogger(Logger):
 
 
 def run(scene: Scene) -> Captured:
-    """Run a resolved scene in this process and keep everything."""
+    """Runs a resolved scene in this process and keeps everything."""
     time = Timebase.from_scene(scene)
     logger = CapturingLogger(scene, time)
     loop = Loop(scene, time, KINDS, LogSession(logger, None, None))
@@ -77,7 +77,7 @@ def summarise(scene: Scene) -> dict[str, Any]:
 
 
 def _joined_states(blocks: list[Block]) -> dict[str, np.ndarray]:
-    """Consecutive blocks share one state; the later block knows the force that acts from it on. Pieces share none."""
+    """Joins consecutive blocks, which share one state; the later has the force from then on. Pieces share none."""
     columns: dict[str, np.ndarray] = {}
     for name in blocks[0]["columns"]:
         rows = [np.frombuffer(block["columns"][name]) for block in blocks]
@@ -104,7 +104,7 @@ OF_THE_MACHINE = ("wall_s", "real_time_factor", "versions")
 
 
 def of_the_scene(summary: dict[str, Any]) -> dict[str, Any]:
-    """The summary but for what differs between two runs of the same scene."""
+    """The summary without the keys that differ between two runs of the same scene."""
     return {name: value for name, value in summary.items() if name not in OF_THE_MACHINE}
 
 

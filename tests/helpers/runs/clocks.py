@@ -1,4 +1,4 @@
-"""The clock the tests of the clock ask, and the questions in short."""
+"""The clock that the tests of the clock query, and short forms of the queries."""
 
 import math
 from typing import Any
@@ -24,6 +24,6 @@ def granted(subject: Clock, slowest: int = TICKS, now: float = 0.0) -> int:
 
 
 def sent(subject: Clock) -> list[tuple[int, str]]:
-    """The events that go out now, by what they do."""
+    """The events that are sent now, by what they do."""
     verbs = ("swap", "set", "pause", "resume", "stop", "refused")
     return [(tick, next(verb for verb in verbs if verb in event)) for tick, event in subject.take_events()]

@@ -1,4 +1,4 @@
-"""Loops run compiled, for the tests of the compiled way; without jax these are skipped."""
+"""Loops run compiled, for the tests of compiled runs; without jax these are skipped."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def compiled(scenes: list[Scene], kinds: dict[str, type[Element]] = KINDS, **opt
 
 
 def many(count: int, **tables: Any) -> list[Scene]:
-    """Loops that differ in their walls alone; one program serves all of this structure."""
+    """Loops that differ only in their walls; one program serves all of this structure."""
     return [pressed(wall={"position": -0.002, "stiffness": 200.0 + i}, **tables) for i in range(count)]
 
 
 def agree(found: Any, expected: Any, within: float = 1e-9) -> bool:
-    """Tells whether two results say the same, numbers to within a relative error, or what is nothing beside 1."""
+    """Tells whether two results agree, numbers to within a relative error or an absolute one negligible beside 1."""
     if isinstance(expected, dict):
         return found.keys() == expected.keys() and all(agree(found[key], expected[key], within) for key in expected)
     if isinstance(expected, list):

@@ -1,4 +1,4 @@
-"""Runs that figures are drawn of."""
+"""Runs for tests of figures."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from helpers.scenes.least import KINDS
 
 
 def compiler() -> str:
-    """Returns the C compiler that there is; skips the test where there is none."""
+    """Returns the available C compiler; skips the test where there is none."""
     return next(filter(shutil.which, ("cc", "gcc", "clang")), None) or pytest.skip("there is no C compiler")
 
 
@@ -43,7 +43,7 @@ class Recorded:
 
 
 def recorded(scene: Scene) -> Recorded:
-    """Runs plant and controller of a scene, its changes at their ticks, and keeps what passed between them."""
+    """Runs plant and controller of a scene, with its changes at their ticks, and keeps what they exchange."""
     time = Timebase.from_scene(scene)
     plant, controller = Plant(scene, time), Controller(scene, time, KINDS)
     samples: list[tuple[float, ...]] = []
@@ -65,7 +65,7 @@ def recorded(scene: Scene) -> Recorded:
 
 @dataclass
 class Stepped:
-    """An FMU that is initialised, by names of its variables; ``said`` is what it has told."""
+    """An initialised FMU, accessed by the names of its variables; ``said`` holds its log messages."""
 
     slave: Any
     references: dict[str, int]
@@ -95,7 +95,7 @@ def made(scene: Scene, folder: Path, stem: str = "controller") -> Path:
 
 @contextmanager
 def stepped(path: Path, start_s: float = 0.0) -> Iterator[Stepped]:
-    """Loads an FMU for the time of the block."""
+    """Loads an FMU for the duration of the block."""
     from fmpy import extract, read_model_description
     from fmpy.fmi3 import FMU3Slave
 
@@ -121,7 +121,7 @@ def forces_of(
     """Steps an FMU along positions at ticks; returns the force at every communication point, before its step.
 
     Args:
-        steps: plant steps of a communication step.
+        steps: plant steps per communication step.
         first: the tick of the first position.
     """
     time = Timebase.from_scene(scene)

@@ -1,4 +1,4 @@
-"""The controller and the books along a motion that is given, as no plant is needed to ask what a spring leaks."""
+"""The controller and the books along a given motion, since no plant is needed to find what a spring leaks."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from helpers.scenes.least import KINDS
 
 
 def books_along(scene: Scene, x: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Have the controller of a scene see a motion, its delayed commands act on it, and the books written.
+    """Lets the controller of a scene see a motion and its delayed commands act on it, and writes the books.
 
     Args:
         scene: a resolved scene; its duration is that of the motion.
         x: position at every plant step and at the end, m.
 
     Returns:
-        The running books at every tick by name, J, and the summary's ``energy``. What the plant's own books say has
-        no meaning here, since no plant moved so.
+        The running books at every tick by name, J, and the summary's ``energy``. The plant's own books have no meaning
+        here, since no plant moved this way.
     """
     time = Timebase.from_scene(scene)
     n, steps = time.steps_per_tick, time.ticks * time.steps_per_tick

@@ -17,5 +17,5 @@ def ended(scene: Scene) -> End:
 
 
 def found(scene: Scene) -> Finding:
-    """What is found at the end of a scene's run."""
+    """The finding at the end of a scene's run."""
     return judge_scene(scene, registry())

@@ -1,4 +1,4 @@
-"""The controller and the books of a scene around a plant of somebody else's, in this process."""
+"""The controller and the books of a scene around a foreign plant, in this process."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Step = Callable[[float], tuple[float, float]]
 
 
 def booked(scene: Scene, columns: dict[str, Any], controller: Controller, foreign: tuple[str, ...] = ()) -> Summary:
-    """Returns the summary that the logger writes of the rows of a plant and of what the controller has recorded."""
+    """Returns the summary that the logger writes from the rows of a plant and those recorded by the controller."""
     time = Timebase.from_scene(scene)
     logger = Logger(scene, time, None)
     logger.foreign = foreign
@@ -32,7 +32,7 @@ def booked(scene: Scene, columns: dict[str, Any], controller: Controller, foreig
 
 
 def around(scene: Scene, step: Step, x: float, v: float) -> tuple[dict[str, np.ndarray], Controller]:
-    """Runs the controller of a scene around a plant; returns the plant's rows and the controller, its rows not taken.
+    """Runs the controller of a scene around a plant; returns the plant's rows and the controller, rows not yet taken.
 
     Args:
         step: from the force held over a plant step, N, to position and velocity after it.
@@ -57,6 +57,6 @@ def around(scene: Scene, step: Step, x: float, v: float) -> tuple[dict[str, np.n
 
 
 def run_around(scene: Scene, step: Step, x: float, v: float) -> tuple[dict[str, np.ndarray], Summary]:
-    """Returns the rows of a plant that a controller of the scene was put around, and the summary of the run."""
+    """Returns the rows of a plant around which the scene's controller ran, and the summary of the run."""
     columns, controller = around(scene, step, x, v)
     return columns, booked(scene, columns, controller, ("plant",))

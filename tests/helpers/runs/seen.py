@@ -1,4 +1,4 @@
-"""What a page that received some motion sees of it."""
+"""What a page sees of a motion that it received."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ COUNT_M = 1e-5
 
 
 def history_of(x, force, wall_m: float | None = 0.0):
-    """A history of positions and forces over time, functions of s, sampled at plant steps, of 3 s."""
+    """A history over 3 s of positions and forces, functions of time in s, sampled at plant steps."""
     history, ticks = History(TIME, 0), 3000
     t = np.arange(ticks * 10) / 1e4
     history.append_steps(0, {"x": x(t) + 0.0 * t, "force": force(t) + 0.0 * t})

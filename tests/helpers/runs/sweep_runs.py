@@ -15,7 +15,7 @@ from haploop.tools.sweep.table import make_schema
 
 
 class Quiet(SweepProgress):
-    """Keeps what it is told."""
+    """Keeps what is reported to it."""
 
     def __init__(self) -> None:
         super().__init__("quiet")
@@ -30,7 +30,7 @@ class Quiet(SweepProgress):
 
 
 def engine_run(made: Any, out: Path, stop_after: int | None = None, workers: int = 1) -> tuple[Quiet, list[Boundary]]:
-    """Run a sweep into a directory, stopped after so many cells; what was told, and the boundaries."""
+    """Runs a sweep into a directory, stopped after ``stop_after`` cells; returns the progress and the boundaries."""
     out.mkdir(exist_ok=True)
     (out / "sweep.toml").write_text(made.toml())
     told = Quiet()

@@ -1,4 +1,4 @@
-"""Verdicts of loops drawn by seed beside what becomes of them.  python -m helpers.runs.wild_verdicts COUNT [FROM]"""
+"""Verdicts of loops drawn by seed beside their long-run swings.  python -m helpers.runs.wild_verdicts COUNT [FROM]"""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from haploop.protocol.scene.scene import Scene
 from helpers.scenes.wild_loops import KINDS, drawn
 from oracles.long_hold import swings
 
-# A swing is felt, or not, that is as much stronger, or weaker, than the weakest one.
+# A swing this much stronger than the weakest that is felt counts as felt, and one this much weaker as not felt.
 _FELT = 1.1
 
 
 class Judged(NamedTuple):
-    """A loop, what is found at the end of its run, and how many times what a hand feels it swings in the long run."""
+    """A loop, the finding at the end of its run, and its swing in the long run over the least that a hand feels."""
 
     seed: int
     scene: Scene
@@ -40,7 +40,7 @@ class Judged(NamedTuple):
 
 
 def judged(seeds: Iterable[int], count: int, each: Callable[..., Iterable[Any]] = map) -> list[Judged]:
-    """So many loops of the seeds that end in contact, without diverging on the way; ``each`` finds of every seed."""
+    """``count`` loops of the seeds that end in contact without diverging; ``each`` maps the search over the loops."""
     left, found = iter(seeds), list[tuple[int, Scene, Finding]]()
     while len(found) < count and (some := [*islice(left, count - len(found))]):
         loops = [(seed, scene) for seed in some if (scene := drawn(seed))]

@@ -1,4 +1,4 @@
-"""Short scenes, and work that processes of their own can import."""
+"""Short scenes, and work that separate processes can import."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A plugin with a brake, f = -b v, that does whatever a test wants as it is imported, made, and asked for a force."""
+"""A plugin with a brake, f = -b v, that does what a test wants when it is imported, made, and asked for a force."""
 
 from __future__ import annotations
 
@@ -27,5 +27,5 @@ class Brake(Element):
 
 
 def source(at_import: str = "pass", at_making: str = "pass", at_force: str = "pass") -> str:
-    """Returns the text of the file; each statement stands on a line of its own. ``self.tick`` counts from 0."""
+    """Returns the text of the file, with each statement on a separate line. ``self.tick`` counts from 0."""
     return _SOURCE.format(at_import=at_import, at_making=at_making, at_force=at_force)

@@ -45,7 +45,7 @@ def outcomes(path: Path, methods: list[str], rates: list[int], reference: Refere
 
 
 def count_stages(counts):
-    """A stage that notes its name and how many measurements were announced and made."""
+    """A stage that records its name and how many measurements were announced and made."""
 
     def stage(name, announced):
         entry = counts.setdefault(name, {"announced": announced, "made": 0})

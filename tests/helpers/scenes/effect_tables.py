@@ -36,12 +36,12 @@ EFFECTS: dict[str, dict[str, Any]] = {
 
 
 def slowly(values: Iterable[Any]) -> list[Any]:
-    """These parameters with the slow tests only."""
+    """These parameters, for the slow tests only."""
     return [pytest.param(value, marks=pytest.mark.slow) for value in values]
 
 
 def subsets(least: int, most: int, of: Iterable[str] = tuple(EFFECTS)) -> list[tuple[str, ...]]:
-    """All sets of so many effects."""
+    """All sets of ``least`` to ``most`` effects."""
     return [chosen for size in range(least, most + 1) for chosen in combinations(of, size)]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 ENCODER = {"resolution": 1e-5}
 READ = {"acceleration": {"source": "accelerometer"}}
 FILTER = {"estimator": "kalman", "jerk_density": 10.0}
-# The least that names each effect. What an effect cannot be without stands in the lists of ``BESIDE``.
+# The least that names each effect. The lists of ``BESIDE`` hold the effects that an effect cannot be without.
 METHODS = ("euler", "semi-implicit-euler", "rk4", "implicit-midpoint", "dop853")
 NAMING: dict[str, dict[str, Any]] = {
     **{f"clock.integrator = {method}": {"clock": {"integrator": method}} for method in METHODS},

@@ -13,7 +13,7 @@ from haploop.protocol.scene.scene import Scene
 KINDS = registry()
 LEAST: dict[str, Any] = {"title": "least", "duration": 1.0, "device": {"mass": 0.01, "damping": 0.1}}
 WALL = {"position": -0.06, "stiffness": 150.0}
-# A device that a hand presses into a wall, with a delay; for ``scene``.
+# A device that a hand presses into a wall, with a delay: tables for ``scene``.
 PRESSED: dict[str, Any] = {
     "duration": 0.3,
     "seed": 5,
@@ -31,7 +31,7 @@ HELD: dict[str, Any] = {
 
 
 def scene(**tables: Any) -> Scene:
-    """The least scene with these tables, resolved; judged the cheap way where its tables do not say how."""
+    """The least scene with these tables, resolved; judged the cheap way unless its tables say how."""
     given = tables.get("run", {})
     if isinstance(given, dict):
         tables = {**tables, "run": {"verdict": "window", **given}}

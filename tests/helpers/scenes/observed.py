@@ -1,4 +1,4 @@
-"""A wall behind a coarse encoder whose small swing draws on what a passivity observer has in store."""
+"""A wall behind a coarse encoder whose small swing uses up the energy that a passivity observer has in store."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from helpers.scenes.least import scene
 
 
 def observed(stiffness: float = 1000.0, **tables: Any) -> Scene:
-    """Once that is used up, which takes some ten seconds, the controller chatters, and a hand feels it."""
+    """The loop: once the store is used up, after some ten seconds, the controller chatters, and a hand feels it."""
     return scene(
         duration=3.0, device={"mass": 0.3, "damping": 0.15}, encoder={"resolution": 0.2 / 4096},
         wall={"position": -0.005, "stiffness": stiffness}, clock={"round_trip_delay": 5e-4},

@@ -13,5 +13,5 @@ PLAIN: dict[str, Any] = {
 
 
 def pressed(**tables: Any) -> dict[str, Any]:
-    """The plain loop pressed against the wall; for it alone K = 1 000 N/m is the limit."""
+    """The plain loop pressed against the wall; without other tables its limit is K = 1 000 N/m."""
     return {**PLAIN, "hand": {"force": {"kind": "constant", "value": -1.0}}, **tables}

@@ -1,4 +1,4 @@
-"""Scenes drawn by seed, with everything a scene can hold, and such that two ways of computing them can be compared."""
+"""Scenes drawn by seed, with everything a scene can hold, for which two ways of computing them can be compared."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def elements(rng: np.random.Generator) -> list[dict[str, Any]]:
 
 
 def drawn(seed: int) -> tuple[Scene, Truth]:
-    """The first comparable scene of this seed, and what the reference makes of it.
+    """The first comparable scene of this seed, and the motion that the reference computes for it.
 
-    Roundings, contacts and gates are decisions: where one hangs on the last bit, or where the motion is chaotic, two
-    correct programs part. A scene is comparable when the reference, started 1e-16 m beside itself, stays within
-    1e-12 of its largest excursion of itself.
+    Roundings, contacts and gates are decisions: where one depends on the last bit, or where the motion is chaotic, two
+    correct programs diverge. A scene is comparable when the reference, started 1e-16 m beside its start, deviates from
+    itself by no more than 1e-12 of its largest excursion.
     """
     rng = np.random.default_rng(seed)
     for _ in range(20):
@@ -56,7 +56,7 @@ def drawn(seed: int) -> tuple[Scene, Truth]:
 
 
 def is_comparable(candidate: Scene, truth: Truth) -> bool:
-    """Tells whether a scene's outcome hangs on no last bit."""
+    """Tells whether a scene's outcome does not depend on a last bit."""
     beside = simulate(candidate, start_beside=1e-16)
     if len(truth.x) != len(beside.x):
         return False

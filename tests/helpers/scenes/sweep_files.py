@@ -1,4 +1,4 @@
-"""Sweep files over a short press into a wall, and what came of them."""
+"""Sweep files over a short press into a wall, and their results."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ KINDS = ("plain", "trembling", "noisy", "short", "bouncing", "close")
 
 @dataclass(frozen=True)
 class Drawn:
-    """A loop in contact; ``rate_1_s`` is ln rho(M) / T, the growth of any disturbance in the end."""
+    """A loop in contact; ``rate_1_s`` is ln rho(M) / T, the eventual growth of any disturbance."""
 
     kind: str
     scene: Scene

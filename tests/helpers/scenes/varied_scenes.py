@@ -27,7 +27,7 @@ ESTIMATORS: list[dict[str, Any]] = [
 
 
 def drawn_base(seed: int) -> Scene:
-    """A scene with all that runs in arrays; what is random in it, too."""
+    """A scene with everything that runs in arrays, random parts included."""
     rng = np.random.default_rng(seed)
     tables = tables_of(seed, rng)
     if seed % 2:
@@ -62,7 +62,7 @@ def drawn_chain(seed: int) -> Scene:
 
 
 def varied(base: Scene, rng: np.random.Generator) -> Scene:
-    """Returns a scene of equal structure, every number by up to a tenth another one, and another seed."""
+    """Returns a scene of equal structure in which every number differs by up to a tenth, with another seed."""
     return replace(_varied(base, rng), seed=int(rng.integers(2**62)), title=f"varied {rng.integers(1000)}")
 
 

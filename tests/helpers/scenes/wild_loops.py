@@ -1,4 +1,4 @@
-"""Loops drawn by seed to be judged: shipped devices and hands and others, of every kind that is hard to tell."""
+"""Loops drawn by seed to be judged: shipped devices and hands and others, of every kind that is hard to judge."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _DELAYS = (0, 0, 5, 10, 15, 20, 50)  # in tenths of a millisecond
 
 
 def drawn(seed: int) -> Scene | None:
-    """The scene of a seed, of the kind ``KINDS[seed % 10]``; None where no wall of 50 N/m to 200 N/mm is its limit."""
+    """The scene of a seed, of the kind ``KINDS[seed % 10]``; None where its limit is not within 50 N/m to 200 N/mm."""
     rng = np.random.default_rng(seed)
     kind = KINDS[seed % len(KINDS)]
     if kind == "slow":
         return Scene.from_dict(_slow(rng, seed))
     scene = Scene.from_dict(_tables(rng, kind, seed))
     assert scene.wall
-    # Of the loop without what makes it no linear map.
+    # The limit of the loop without everything that makes it nonlinear.
     elements = tuple(one for one in scene.dissipation if one.kind in ("damping", "bidirectional-inertia"))
     linear = replace(scene, friction=None, actuator=None, encoder=None, dissipation=elements)
     low, limit = next(iter(OneTickMap.from_scene(linear).stable_ranges()), (1.0, 0.0))
@@ -110,11 +110,11 @@ def _tables(rng: np.random.Generator, kind: str, seed: int) -> dict[str, Any]:
 
 
 def _slow(rng: np.random.Generator, seed: int) -> dict[str, Any]:
-    """A heavy device at a soft wall, at 0.25 to 1 Hz; the wall is 0.3 to 2 of its limit b / (T / 2 + d)."""
+    """A heavy device at a soft wall, at 0.25 to 1 Hz; the wall is 0.3 to 2 times its limit b / (T / 2 + d)."""
     frequency, mass, late = rng.uniform(0.25, 1.0), between(rng, 0.1, 2.0), rng.integers(0, 300) / 10_000
     stiffness = mass * (math.tau * frequency) ** 2
     damping = stiffness * (0.0005 + late) / (rng.uniform(0.9, 1.1) if rng.random() < 0.3 else between(rng, 0.3, 2.0))
-    hold = stiffness * between(rng, 0.01, 0.1)  # N, in so many metres
+    hold = stiffness * between(rng, 0.01, 0.1)  # N, under which the wall yields by that many metres
     tables: dict[str, Any] = {"encoder": {"resolution": between(rng, 1e-6, 1e-4)}} if rng.random() < 0.5 else {}
     return tables | {
         "title": f"slow {seed}",

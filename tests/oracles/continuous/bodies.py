@@ -1,4 +1,4 @@
-"""Device and hand as one linear system in as many digits as asked for, its flow, and the roots of its power series.
+"""Device and hand as one linear system in any number of digits, its flow, and the roots of its power series.
 
 Only for making references: it needs mpmath, and it is slow.
 """
@@ -27,7 +27,7 @@ class Bodies:
     and y' = 2 pi bandwidth (a - y); both are absent where the scene has no bandwidth.
 
     Attributes:
-        free, stuck: A, with body 0 free, and held where it is.
+        free, stuck: A with body 0 free, and with it held in place.
         force: the row of w that gives the force on body 0 without friction, N.
         sensed: by whether body 0 is stuck, the row of w that an accelerometer feels.
         begin: w at t = 0, with nothing acting.
@@ -88,7 +88,7 @@ class Bodies:
 
 
 class Flow:
-    """e^{A t} of one mode: over a fixed length by the matrix exponential, over any shorter one by its series."""
+    """e^{A t} of one mode: over a fixed length by the matrix exponential, over any shorter length by its series."""
 
     def __init__(self, rates: Matrix, length_s: Any) -> None:
         self._rates = rates
@@ -132,7 +132,7 @@ def sign_changes(series: Row, length: Any) -> Row:
     """Returns all t in [0, length] at which the polynomial sum series[k] t^k changes its sign, in order.
 
     Where the constant outweighs all other terms there is none. Else the roots of the derivative cut the interval into
-    pieces in which it only rises or only falls, and each holds one at most.
+    pieces in which the polynomial only rises or only falls, and each holds at most one.
     """
     rest, power = mpf(0), mpf(1)
     for coefficient in series[1:]:
@@ -153,7 +153,7 @@ def sign_changes(series: Row, length: Any) -> Row:
 
 
 def _between(series: Row, begin: Any, end: Any, at_begin: Any) -> Any:
-    """Finds the one root between by Newton's steps, and a bisection wherever they would leave the bracket."""
+    """Finds the one root in between by Newton's steps, with a bisection wherever they would leave the bracket."""
     slope_series = [k * coefficient for k, coefficient in enumerate(series)][1:]
     t = (begin + end) / 2
     while end - begin > mp.eps * end:

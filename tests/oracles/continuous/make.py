@@ -1,9 +1,9 @@
-"""Makes the stored references of the accuracy scenes anew.
+"""Makes the stored references of the accuracy scenes again.
 
 PYTHONPATH=tests python -m oracles.continuous.make [SCENE...]
 
 The sampled loop with the program's own controller, sensors and line, closed around a continuous plant in 50 decimal
-digits. Needs mpmath, of the dev extra.
+digits. Needs mpmath, which is in the dev extra.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ Done = Callable[[], object]
 
 
 class Continuous(Protocol):
-    """A plant that knows nothing of steps; loads are tau + k_h rest in N, exact."""
+    """A plant without steps; loads are tau + k_h rest in N, exact."""
 
     @property
     def x(self) -> float: ...
@@ -97,7 +97,7 @@ def _late_s(scene: Scene) -> float:
 
 
 def _points(scene: Scene) -> list[tuple[Fraction, Fraction]]:
-    """Returns corners (s, N) of tau, straight between them, held outside; times are the scene's decimal numbers."""
+    """Returns the corners (s, N) of tau, linear between and constant outside; times are the scene's decimal numbers."""
     match (scene.hand or Hand()).force or Constant(value=0.0):
         case Constant(value=value):
             times, forces = (0.0,), (value,)
@@ -160,7 +160,7 @@ def _verdict(scene: Scene, time: Timebase, controller: Controller, x: list[float
 
 
 def in_digits(scene: Scene, digits: int, tick_done: Done = lambda: None) -> Closed:
-    """Runs the loop around the continuous plant in so many decimal digits."""
+    """Runs the loop around the continuous plant in ``digits`` decimal digits."""
     with mp.workdps(digits):
         plant = ContinuousPlant(scene, mpf(1) / scene.clock.control_rate)
         return close_loop(scene, plant, lambda load: mpf(load.numerator) / load.denominator, tick_done)
@@ -174,7 +174,7 @@ def integrated(scene: Scene, tick_done: Done = lambda: None) -> Closed:
 
 
 def reference(name: str, scene: Scene, stage: Stage) -> tuple[Reference, dict[str, dict[str, float]]]:
-    """Makes the reference of a resolved scene, showing progress by ticks; returns it, and what it was checked by."""
+    """Makes the reference of a resolved scene, showing progress by ticks; returns it and its checks."""
     ticks = make_timebase(scene).ticks
     truth = in_digits(scene, DIGITS, stage(f"{name}: {DIGITS} digits", ticks))
     fewer = in_digits(scene, FEWER_DIGITS, stage(f"{name}: {FEWER_DIGITS} digits", ticks))
@@ -196,7 +196,7 @@ def reference(name: str, scene: Scene, stage: Stage) -> tuple[Reference, dict[st
         f"{max(growth.values()):.3g} times as far away.",
         verdict=truth.verdict,
         pointwise=compares_pointwise(growth),
-        # Not from the exact method, which is itself to be judged by this reference.
+        # Not from the exact method, which this reference is to judge.
         error_m=max(fewer_m, numerical_m),
         statistics=statistics(scene, x_m, v_m_s),
         x_m=x_m,

@@ -1,4 +1,4 @@
-"""The continuous plant tick by tick: in as many digits as asked for, and by DOP853 to check it."""
+"""The continuous plant tick by tick: in any number of digits, and by DOP853 to check it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Vector = TypeVar("Vector", bound=Any)
 
 
 class StickSlipPlant(ABC, Generic[Vector]):
-    """Motion w' = A w with body 0 free or held; friction decides which where its velocity is 0.
+    """Motion w' = A w with body 0 free or held; where its velocity is 0, friction decides which.
 
     Args:
         scene: resolved; friction without a Stribeck velocity, since that is not linear.
@@ -43,7 +43,7 @@ class StickSlipPlant(ABC, Generic[Vector]):
         number: converts a float of the scene to the numbers of w.
 
     Attributes:
-        w: states, as of ``Bodies``.
+        w: states, as in ``Bodies``.
     """
 
     def __init__(self, scene: Scene, bodies: Bodies, w: Vector, number: Any) -> None:
@@ -75,7 +75,7 @@ class StickSlipPlant(ABC, Generic[Vector]):
             self._decide()
 
     def _decide(self) -> None:
-        """Lets body 0 stick at v = 0 if friction can hold the other forces, else slip where they pull."""
+        """Lets body 0 stick at v = 0 if friction can hold the other forces, or else slip in their direction."""
         if self.w[self._v] == 0:
             force = self._force()
             self.is_stuck = abs(force) <= self._breakaway
@@ -84,7 +84,7 @@ class StickSlipPlant(ABC, Generic[Vector]):
         self.w[FRICTION] = 0 * self._kinetic if self.is_stuck else -self._direction * self._kinetic
 
     def _switch(self) -> None:
-        """Ends the present mode: what stuck slips where the force pulls, what slipped has come to v = 0."""
+        """Ends the present mode: a stuck body slips in the direction of the force, a slipping one has come to v = 0."""
         if self.is_stuck:
             self.is_stuck, self._direction = False, _sign(self._force())
             self.w[FRICTION] = -self._direction * self._kinetic
@@ -97,8 +97,8 @@ class ContinuousPlant(StickSlipPlant[Row]):
     """The plant of a scene under held commands and a load that is linear between ticks, in mpmath's digits.
 
     Without friction a tick is one matrix exponential. With friction it is cut into pieces; in each the margin of the
-    mode (the speed in its direction, or what friction could hold beyond the forces) is a power series in t, whose
-    first root, if there is one, is where the mode ends, known to 1e-30 s. None is missed: see ``sign_changes``.
+    mode (the speed in its direction, or the force that friction could hold beyond the others) is a power series in t.
+    Its first root, if there is one, is where the mode ends, known to 1e-30 s. None is missed: see ``sign_changes``.
 
     Args:
         period_s: one tick, as an exact number.
@@ -158,7 +158,8 @@ class ContinuousPlant(StickSlipPlant[Row]):
 class IntegratedPlant(StickSlipPlant[np.ndarray]):
     """The plant of a scene by scipy's DOP853 in floats (Dormand and Prince), with events where friction switches.
 
-    In relative coordinates, each body's from the one before: a stiff cable's force is no difference of two positions.
+    It uses relative coordinates, each body's from the one before, so that a stiff cable's force is not a difference of
+    two positions.
     """
 
     def __init__(self, scene: Scene, period_s: Any) -> None:
@@ -190,7 +191,7 @@ class IntegratedPlant(StickSlipPlant[np.ndarray]):
         return float(self._row @ self.w)
 
     def _to_switch(self, length: float) -> float:
-        """Advances at most so long; returns how long it was."""
+        """Advances by at most ``length``; returns by how much it did."""
         if self.is_stuck:
             switch = _Switch(lambda w: self._breakaway - abs(float(self._row @ w)))
         else:
@@ -228,7 +229,7 @@ class _Switch(NamedTuple):
 
 
 def _coordinates(bodies: int, size: int) -> tuple[Any, Any]:
-    """Returns relative coordinates from absolute ones, and back; what is neither position nor velocity stays."""
+    """Returns the matrices from absolute to relative coordinates, and back; other states stay unchanged."""
     relative, absolute = mp.eye(size), mp.eye(size)
     for first in (0, bodies):
         for i in range(1, bodies):

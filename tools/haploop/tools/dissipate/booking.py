@@ -214,7 +214,7 @@ class MeasuredTime(Timebase):
 
     @classmethod
     def from_period(cls, period_s: float, lookahead: int) -> MeasuredTime:
-        """Makes the timebase of samples ``period_s`` apart; commands take effect ``lookahead`` samples later, or one more."""
+        """Makes it for samples ``period_s`` apart; commands take effect ``lookahead`` samples later, or one more."""
         rate = max(1, round(1.0 / period_s))
         return cls(rate, rate, lookahead, 1, period_s)
 

@@ -115,7 +115,7 @@ def make_row(element: ElementOutcome) -> tuple[str, ...]:
 
 
 def conclusion(outcome: Outcome) -> str:
-    """Returns which element would have dissipated most and which would have fed the motion; for a force, its work."""
+    """Returns which element would have dissipated most, and which have fed the motion; for a force alone, its work."""
     if not outcome.elements and outcome.force:
         return _passivity(outcome)
     if not outcome.elements:

@@ -119,7 +119,7 @@ class LabelRoom:
 
 @dataclass(frozen=True)
 class Label:
-    """Text for a point, in data coordinates; of every ``group`` at least one is placed. ``half_px``: half the point."""
+    """Text for a point, in data coordinates; of every ``group`` at least one is placed. ``half_px`` is of the point."""
 
     x: float
     y: float

@@ -72,7 +72,7 @@ def few_ticks(ax: Axes) -> None:
 
 
 def plain_numbers(axis: Axis, at: tuple[float, ...] = (1.0, 2.0, 5.0)) -> None:
-    """Labels a logarithmic axis at these multiples in every decade, with numbers without powers of ten."""
+    """Labels a logarithmic axis at these multiples in every decade, with plain numbers, not powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axis.set_major_locator(LogLocator(subs=at))

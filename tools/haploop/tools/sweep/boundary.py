@@ -117,7 +117,7 @@ def _beyond_undecided(
     answers: Callable[[Sequence[Candidate]], object],
     tolerance: Tolerance,
 ) -> dict[int, Bracket]:
-    """Returns, for each row whose far side is undecided, where that ends: the last undecided value, and the next one.
+    """Returns, for each row whose far side is undecided, where that ends: the last value known so, and the next one.
 
     What the search has not decided up to the last point stays undecided up to there.
     """

@@ -110,7 +110,7 @@ def _without_places(name: str) -> str:
 
 
 def _kind(name: str, value: Any) -> str:
-    """Returns the kind of a column from one of its values; for None, as a verdict is after two ticks, the declared one."""
+    """Returns the kind of a column from one of its values; for None, as some are after two ticks, as it is declared."""
     if value is None:
         declared = Finding.__annotations__.get(name.removeprefix("stability."), "")
         return TEXT if "str" in declared else TRUTH if "bool" in declared else NUMBER

@@ -172,7 +172,7 @@ class _Reader:
         return [axis for key, values in given.items() if whole and (axis := self._axis(key, values, whole))]
 
     def _with_first_names(self, base: Layers) -> Layers:
-        """Returns the base with the first value of each axis of names or tables, which may bring keys of another axis."""
+        """Returns the base with the first name or table of each axis of these, which may bring another axis's keys."""
         firsts = {key: values[0] for key, values in self._data["axes"].items() if isinstance(values, list) and values}
         names = {key: value for key, value in firsts.items() if not isinstance(value, int | float) and key_path(key)}
         layers = Layers(self._layers.path, base.data)

@@ -1,4 +1,4 @@
-"""Swings that last but are no wider than a staircase of counts may be, so that they may or may not be a buzz."""
+"""Swings that last but are no wider than a staircase of counts may be: whether they are a buzz cannot be said."""
 
 from __future__ import annotations
 

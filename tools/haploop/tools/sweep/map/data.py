@@ -74,7 +74,7 @@ class Layout:
 
     @classmethod
     def from_axes(cls, axes: Sequence[Axis]) -> Layout:
-        """Puts numeric axes along the map, the wall's stiffness upwards; names, or the shortest of three, make panels."""
+        """Puts numbers along the map, the wall's stiffness upwards; names, or the shortest of three, make panels."""
         numeric = [number for number, axis in enumerate(axes) if not axis.names]
         if len(numeric) == 3:
             free = [number for number in numeric if axes[number].key != STIFFNESS]
@@ -138,7 +138,7 @@ class MapData:
 
     @property
     def has_edges(self) -> bool:
-        """Tells whether this is a finished bisecting sweep with axes beside that of the search."""
+        """Tells whether this is a finished bisecting sweep, with axes beside that of the search."""
         return bool(self.boundary) and len(self.axes) > 1
 
     @property

@@ -121,7 +121,7 @@ class Answer:
 
 
 def furthest(edges: Edges) -> Answer | None:
-    """Finds the combination that holds furthest from where the search begins; None where no boundary was found."""
+    """Finds what holds furthest from where the search begins; None where no boundary was found and nothing holds."""
     if (throughout := np.argwhere(edges.state == State.ALL_HOLD)).size:
         end = -1 if edges.rising else 0
         words = f"{edges.holds} {edges.reaches} {edges.along.word(end)} and perhaps beyond"

@@ -44,7 +44,7 @@ def draw_cells(ax: Axes, x: Axis, y: Axis, cells: Cells, scale: LogNorm | None) 
 
 
 def _hatch(ax: Axes, edges: tuple[np.ndarray, np.ndarray], where: np.ndarray, look: Look, gid: str) -> None:
-    """Draws one hatched patch of all cells of a verdict, from unbroken runs in rows, so that the hatching is continuous."""
+    """Draws one hatched patch of all cells of a verdict, by unbroken runs in a row, so that hatching is continuous."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
@@ -136,7 +136,7 @@ class SwingScale:
         self.shelf = self.high / np.sqrt(_ABOVE)
 
     def place(self, amplitudes_m: np.ndarray) -> np.ndarray:
-        """Returns coordinates of amplitudes: those below ``least`` on the floor, unknown and infinite ones on the shelf."""
+        """Returns coordinates of amplitudes: below ``least`` on the floor, unknown and infinite ones on the shelf."""
         at = np.where(amplitudes_m < self.least, self.floor or self.least, amplitudes_m)
         return np.where(np.isfinite(at), at, self.shelf)
 

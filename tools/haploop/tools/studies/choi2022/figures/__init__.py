@@ -1,7 +1,7 @@
-"""The figures of the paper, and how they are drawn, told and kept.
+"""The figures of the paper, and how they are drawn, described and kept.
 
 A function ``make_N`` in a module with N in its name, ``figure_N`` or ``figure_M_N``, makes figure N from a ``Work`` and
-returns its findings; it needs no entry anywhere. Its words stand in ``words.toml``.
+returns its findings; it needs no entry anywhere. Its words are in ``words.toml``.
 """
 
 from __future__ import annotations

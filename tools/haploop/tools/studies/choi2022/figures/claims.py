@@ -1,4 +1,4 @@
-"""Claims of the paper, the findings that tests of them come to, and the texts of the figures (``words.toml``)."""
+"""Claims of the paper, the findings that result from testing them, and the texts of the figures (``words.toml``)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any, Literal, cast, get_args
 Verdict = Literal["holds", "holds under a stated assumption", "rare", "does not hold here"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 HOLDS, ASSUMING, RARE, FAILS = VERDICTS
-# Of random interpretations a claim holds in fewer than this share where it is rare.
+# A claim is rare where it holds in less than this share of random interpretations.
 RARE_BELOW = 0.05
 
 
@@ -22,9 +22,9 @@ class Claim:
 
     Attributes:
         place: section, and figure, equation or item: "III, Fig. 4".
-        quote: its words, shortened; what was left out or put in is in brackets or dots.
-        name: by which its figure tests it.
-        numbers, assumption: of a finding, with names in braces for what is computed.
+        quote: its words, shortened; dots or brackets mark what was left out or added.
+        name: name by which its figure tests it.
+        numbers, assumption: those of a finding, with names in braces for computed values.
         tested: name by which the search of Fig. 7 tests it; "" where it does not.
     """
 
@@ -36,7 +36,7 @@ class Claim:
     tested: str = field(default="", compare=False, repr=False)
 
     def holds_if(self, is_so: bool, under_it: bool = False, /, **computed: Any) -> Finding:
-        """Finds that it holds if ``is_so``, else that it holds under its assumption if ``under_it``, else neither."""
+        """Finds that it holds if ``is_so``, or else under its assumption if ``under_it``, or else not at all."""
         numbers = self.numbers.format(**computed)
         if is_so:
             return Finding(self, HOLDS, numbers)
@@ -50,7 +50,7 @@ class Finding:
     """The outcome of a test of a claim.
 
     Attributes:
-        assumption: what has to be assumed for it to hold, or where it does if it is rare; empty for the other verdicts.
+        assumption: what must be assumed for it to hold, or where it holds if it is rare; empty for other verdicts.
 
     Raises:
         ValueError: there is no such verdict, or an assumption does not belong to it.
@@ -69,13 +69,13 @@ class Finding:
 
     @classmethod
     def by_share(cls, claim: Claim, numbers: str, share: float, where: str) -> Finding:
-        """Finds by the share of random interpretations in which a claim holds, and one of any kind ("" for none)."""
+        """Finds by the share of random interpretations in which a claim holds, and any in which it does ("": none)."""
         if not where:
             return cls(claim, FAILS, numbers)
         return cls(claim, ASSUMING if share >= RARE_BELOW else RARE, numbers, where)
 
     def as_dict(self) -> dict[str, str]:
-        """Returns it as it is kept beside the figure: with the name of the claim, whose words stay in their table."""
+        """Returns the finding as it is kept beside the figure: with the claim's name instead of its words."""
         kept = {"verdict": self.verdict, "assumption": self.assumption, "numbers": self.numbers}
         return {"claim": self.claim.name, **kept}
 
@@ -96,8 +96,8 @@ def claims_of(figure: int) -> dict[str, Claim]:
 
 
 def texts_of(part: int | Literal["page"]) -> dict[str, Any]:
-    """Returns title, caption and the other texts of a figure, with names in braces for what is computed.
+    """Returns title, caption and the other texts of a figure, with names in braces for computed values.
 
-    Those of the page have the titles of the paper's ``sections`` among them.
+    Those of the page include the titles of the paper's ``sections``.
     """
     return {name: text for name, text in _words()[str(part)].items() if name != "claims"}

@@ -1,4 +1,4 @@
-"""Drawings and tables of several figures: colours of elements, momentum over velocity, outcomes of a search."""
+"""Drawings and tables that several figures share: colours of elements, momentum over velocity, results of a search."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _LOOKS = {
     "both": (ELEMENTS[3], "damping and unidirectional"),
 }
 COLOURS, SHORT = ({kind: look[i] for kind, look in _LOOKS.items()} for i in (0, 1))
-# A legend within the axes, on a ground that hides what is behind it; and one in the upper left corner.
+# A legend within the axes, on a background that hides what is behind it; and one in the upper left corner.
 INSIDE: dict[str, Any] = {"framealpha": 0.8, "edgecolor": "none"}
 UPPER_LEFT: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.0, 1.0), "ncols": 1}
 _TAKEN, _GIVEN = "#9FD3B0", "#E8A0A0"
@@ -84,11 +84,11 @@ def claims_table(
     found: Found,
     options: Sequence[Option],
 ) -> str:
-    """Returns a table with a row a claim: where it holds, how often, and what decides it.
+    """Returns a table with one row per claim: where it holds, how often, and what decides it.
 
     Args:
-        alone: interpretations with a column of yes or no, by heading.
-        options: of the random interpretations.
+        alone: single interpretations, by the heading of their column of yes or no.
+        options: those of the random interpretations.
     """
     random, around = found.of("random"), found.of("neighbour")
     rows: list[list[str]] = []
@@ -102,7 +102,7 @@ def claims_table(
 
 
 def open_table(space: InterpretationSpace, figure: int) -> str:
-    """Returns a table of what the paper leaves open: options, or bounds and why they are as they are."""
+    """Returns a table of what the paper leaves open: options, or bounds and the reasons for them."""
     rows = [
         [space.label(key), ", ".join(space.value(key, one) for one in some), ""] for key, some in space.choices.items()
     ]
@@ -120,8 +120,8 @@ def columns_of(rows: Sequence[Row]) -> dict[str, list[Any]]:
 
 
 def search_words(found: Found, effort: Effort, claims: Collection[str]) -> dict[str, Any]:
-    """Returns what the words on any search name: its seed and spread, the interpretations of each stage, ``claims``,
-    how many of them hold in the ``nearest``, what it ``lacks``, and how many hold at ``most``.
+    """Returns the values that the words on any search name: its seed and spread, the interpretations of each stage, the
+    number of ``claims``, how many hold in the ``nearest``, which it ``lacks``, and how many hold at ``most``.
     """
     [nearest] = found.of("nearest")
     stages = Counter(row["stage"] for row in found.rows)

@@ -90,7 +90,7 @@ def make_11(work: Work) -> list[Finding]:
     work.data("figure_11", sizes | {"swing_m": grid.swings_m})
     work.scene("figure_11", setup.scene(PAIR_AT_N_M, elements_of("both", *PAIR)))
     damped, inertia, both = (reached(work, setup, kind) for kind in (KINDS[1], KINDS[3], "both"))
-    # Inertias that steady a wall alone, and what damping adds to them.
+    # Inertias that steady a wall on their own, and what damping adds to them.
     alone = np.flatnonzero(bears[0, 1:]) + 1
     helped = int((bears[1:, alone].max(axis=0) >= bears[0, alone] + STEP_N_M).sum())
     damping, mass = both.sizes
@@ -156,7 +156,7 @@ def _words(work: Work, most: dict[str, Reached], by_run: dict[str, str]) -> str:
 
 
 def _draw(found: dict[str, Range], most: dict[str, Reached]) -> Figure:
-    """Draws full marks for what is steady, faint ones for what was tried besides; right, which inertia is."""
+    """Draws full marks for what is steady, faint ones for all else that was tried; on the right, which inertia is."""
 
     def marks(ax: Axes, sizes: np.ndarray, there: np.ndarray, colour: str, label: str = "") -> None:
         rows, columns = np.nonzero(there)

@@ -22,20 +22,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MODES_HZ = (60.0, 80.0, 105.0, 140.0, 185.0, 245.0, 325.0, 430.0, 570.0)
-# Of the row that is looked at more closely.
+# Modes of the row that is looked at more closely.
 _FINE_HZ = tuple(np.geomspace(45.0, 700.0, 20).tolist())
-# In so many of the rows a rule has to hold to be told as one.
+# Share of the rows in which a rule has to hold to be called one.
 _RULE = 0.9
 _DELAYS_S = (0.0, 0.0005, 0.001, 0.0015, 0.002)
 _BASE = Setup(
     mode_Hz=225.0, near_share=0.3, mode_damping=0.02, push_N=3.0, entry_m_s=0.2, hand=1.0, delay_s=0.0005,
     unit="ideal", mount="motor",
 )  # fmt: skip
-# By less than this nobody wins: the gated map's limits are known to some 2 %.
+# With a smaller lead than this no element wins: the gated map's limits are known to some 2 %.
 DRAW = 1.05
 
 
-# Drives differ in where the masses sit, and in how old the reading is.
+# Drives differ in how the mass is distributed, and in how old the reading is.
 DRIVES = {
     "rotor against the rest, ideal unit": replace(_BASE, near_share=0.055),
     "near mass 0.3, ideal unit": _BASE,
@@ -74,7 +74,7 @@ def make_14(work: Work) -> list[Finding]:
 
 
 def soft_and_stiff(stiffness: np.ndarray) -> np.ndarray:
-    """Returns for each row of modes whether the softest drive asks for an inertia and the stiffest for damping.
+    """Returns for each row of modes whether the softest drive favours an inertia and the stiffest favours damping.
 
     Args:
         stiffness: shape (..., modes, kinds).
@@ -88,7 +88,7 @@ def soft_and_stiff(stiffness: np.ndarray) -> np.ndarray:
 
 
 def _ahead(stiffness: np.ndarray) -> np.ndarray:
-    """Returns the stiffness that the better inertia bears over what damping does."""
+    """Returns the stiffness that the better inertia bears over that which damping bears."""
     return stiffness[..., 2:].max(axis=-1) / np.maximum(stiffness[..., 1], 1.0)
 
 

@@ -36,7 +36,7 @@ Curve = tuple[np.ndarray, np.ndarray]
 
 
 def make_3(work: Work) -> list[Finding]:
-    """Runs three contacts: sampled and held, with an encoder's steps too, with 2 ms of delay too."""
+    """Runs three contacts: sampled and held, then with an encoder's steps as well, then with 2 ms of delay as well."""
     encoder = Encoder(resolution=_RESOLUTION_M)
     late = "One contact, sampled, held, quantised and delayed"
     scenes = {
@@ -69,7 +69,7 @@ def make_3(work: Work) -> list[Finding]:
 def single_contact(title: str, *, delay_s: float = 0.0, **tables: Any) -> Scene:
     """Returns a scene in which the device, hand attached but slack, coasts at 0.1 m/s into 0.15 N/mm and out again.
 
-    It is without encoder, elements and estimators unless ``tables`` say so.
+    It has no encoder, elements or estimators except those in ``tables``.
     """
     estimates = ("encoder", "noise", "dissipation", "velocity", "acceleration")
     scene = without(fig6("b"), *estimates, "hand.stiffness", "hand.damping", "hand.force")
@@ -80,14 +80,14 @@ def single_contact(title: str, *, delay_s: float = 0.0, **tables: Any) -> Scene:
 
 
 def leaks_of_phases_J(scene: Scene, count: int) -> np.ndarray:
-    """Returns the wall's leak in J, whatever the phase: for entries spread over the tick, and walls over a count.
+    """Returns the wall's leak in J over all phases: for entries spread over a tick, and walls spread over a count.
 
-    In the scene as drawn the device covers just one count in a tick, and meets the wall at a tie of the rounding.
+    In the scene as drawn the device covers exactly one count in a tick, and meets the wall at a tie of the rounding.
     """
     wall, way_m = wall_of(scene), _SPEED_M_S * PERIOD_S
     scenes = []
     for i in range(count):
-        # Both phases are even together (Korobov's lattice by the golden ratio).
+        # The two phases are spread evenly together (Korobov's lattice by the golden ratio).
         shift, start = _RESOLUTION_M * (i * _GOLDEN % 1.0), way_m * (i + 0.5) / count
         device = replace(scene.device, position=scene.device.position + shift + start)
         scenes.append(replace(scene, device=device, wall=replace(wall, position=wall.position + shift)))
@@ -126,7 +126,7 @@ def _findings(
     work: Work, curves: Mapping[str, Curve], walls: Mapping[str, Summary], leaks_J: Mapping[str, np.ndarray]
 ) -> list[Finding]:
     energies = {name: _taken_and_given_J(*one) for name, one in curves.items()}
-    # -sum f dx: the force points out, so what it gives on the way out is counted positive: counter-clockwise.
+    # -sum f dx: the force points out, so the energy it gives on the way out is positive: counter-clockwise.
     areas = [float(-np.sum(force[:-1] * np.diff(depth))) for depth, force in curves.values()]
     leaks = [-wall["true_J"] for wall in walls.values()]
     apart = max(abs(area / leak - 1.0) for area, leak in zip(areas, leaks, strict=True))
@@ -171,14 +171,14 @@ def _J(value: float) -> str:
 
 
 def _constant_speed() -> tuple[float, float]:
-    """Returns the leak of a press to 2 mm and back at 0.1 m/s, whole samples, and K x_max v T."""
+    """Returns the leak of a press to 2 mm and back at 0.1 m/s, in whole samples, and K x_max v T."""
     depth = np.concatenate([np.linspace(0.0, 2e-3, 21), np.linspace(2e-3, 0.0, 21)[1:]])
     x = -depth[:, None]
     return float(-taken_J(x, forces(x, SPRING)).sum()), STIFFNESS_N_M * 2e-3 * 0.1 * PERIOD_S
 
 
 def _telescoped() -> tuple[float, float]:
-    """Returns eq. 5 along a random closed path, and -(K / 2) sum (dx)^2, which it comes to by summing by parts."""
+    """Returns eq. 5 along a random closed path, and -(K / 2) sum (dx)^2, which summation by parts makes of it."""
     path = np.random.default_rng(3).normal(scale=1e-3, size=200).cumsum()
     x = np.append(path, path[0])[:, None]
     return float(taken_J(x, forces(x, SPRING)).sum()), float(-STIFFNESS_N_M / 2.0 * (np.diff(x, axis=0) ** 2).sum())

@@ -22,13 +22,13 @@ from haploop.tools.studies.choi2022.figures.work import Work
 from haploop.tools.studies.choi2022.runs import Run, fig6, hand_of, run
 from haploop.tools.studies.choi2022.sampled import MASS_KG, PERIOD_S, closed_form, mean_taken, steps_J
 
-# Cutoffs in Hz by what a row of numbers calls them.
+# Cutoffs in Hz, by their names in a list of numbers.
 CUTOFFS_HZ = {"unfiltered": None, "100 Hz": 100.0, "30 Hz": 30.0, "10 Hz": 10.0}
-# Extra delays, and inertias, for the low-pass with the least lag.
+# Extra delays and inertias with which the low-pass with the least lag is tested.
 _DELAYS_S, _MASSES_G = (0.0, 0.001, 0.002), np.arange(1.0, 41.0)
 # An IMU of the class of the paper's: 300 ug/Hz^0.5, 16 bit over 8 g, 420 Hz (MPU-9250's data sheet).
 IMU = Accelerometer(noise_density=2.9e-3, range=78.5, resolution=2.4e-3, bandwidth=420.0, delay=0.0014)
-# PHANToM Premium 1.5, one count.
+# One count of a PHANToM Premium 1.5.
 COUNT_M = 28.7e-6
 # An encoder so fine that its step does not matter.
 _FINE_M = 1e-7
@@ -128,7 +128,7 @@ def passive_up_to_Hz(cutoff_Hz: float | None) -> float:
 def largest_mass_kg(cutoff_Hz: float | None, stiffness_N_m: float) -> float:
     """Returns the largest virtual mass, from 0 on, with which the paper's device and hand behind 2 ms stay stable.
 
-    It is where rho(M) = 1 of the one-tick map; 0 where the loop is unstable with the least mass already.
+    There rho(M) = 1 for the one-tick map; 0 where the loop is unstable even with the smallest mass.
     """
 
     def is_stable(mass_kg: float) -> bool:
@@ -141,9 +141,9 @@ def largest_mass_kg(cutoff_Hz: float | None, stiffness_N_m: float) -> float:
 
 
 def least_lag_best_g(delay_s: float) -> str:
-    """Returns the inertias with which, of three low-passes, that with the least lag bears the stiffest wall, in g.
+    """Returns the inertias, in g, with which the one with the least lag of three low-passes bears the stiffest wall.
 
-    Of 1 to 40 g tried, ``"8 to 40 g"``; "" for none.
+    For example ``"8 to 40 g"``, of 1 to 40 g that are tried; "" for none.
     """
     cutoffs = [cutoff for cutoff in CUTOFFS_HZ.values() if cutoff]
     bears = np.array([[_stiffest_N_m(1e-3 * mass, cutoff, delay_s) for cutoff in cutoffs] for mass in _MASSES_G])
@@ -152,7 +152,7 @@ def least_lag_best_g(delay_s: float) -> str:
 
 
 def _stiffest_N_m(mass_kg: float, cutoff_Hz: float | None, delay_s: float) -> float:
-    """Returns the end of the stiffnesses, from 0 on, at which device and hand stay stable in contact; 0 for none."""
+    """Returns the stiffness up to which, from 0 on, device and hand stay stable in contact; 0 for none."""
     ranges = _one_tick(mass_kg, cutoff_Hz, delay_s).stable_ranges()
     return ranges[0][1] if ranges and ranges[0][0] == 0.0 else 0.0
 
@@ -165,9 +165,9 @@ def _one_tick(mass_kg: float, cutoff_Hz: float | None, delay_s: float = 0.002) -
 
 
 def errors_m_s2(count_m: float = COUNT_M) -> dict[str, float]:
-    """Returns the RMS error of the controller's acceleration in one contact, by the source of it.
+    """Returns the RMS error of the controller's acceleration in one contact, by its source.
 
-    The contact is with the wall alone, so that the motion is the same whatever is made of it.
+    The contact is with the wall alone, so that the motion does not depend on the estimate.
     """
 
     def accelerations(estimate: Acceleration, accelerometer: Accelerometer | None = None) -> np.ndarray:

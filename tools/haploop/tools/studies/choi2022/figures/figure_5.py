@@ -1,4 +1,4 @@
-"""Fig. 5: where the sign of the acceleration alternates, inertia generates; and what unidirectional inertia does."""
+"""Fig. 5: where the sign of the acceleration alternates, inertia generates; and how unidirectional inertia behaves."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _over_samples(ax: Axes) -> dict[str, np.ndarray]:
 
 
 def _taken_under_jitter(kind: str, drift_m_s: float, ticks: int = 24) -> np.ndarray:
-    """Returns the energy of each sample after the first few under a velocity drift +- jitter, a new sign each time."""
+    """Returns the energy of each sample after the first few, under a velocity drift +- jitter with alternating sign."""
     x = sampled.positions(drift_m_s + _JITTER_M_S * (-1.0) ** np.arange(ticks + 4))[:, None]
     taken = sampled.taken_J(x, sampled.forces(x, kind))[:, 0]
     return np.concatenate([[0.0], taken[4:]])
@@ -86,7 +86,7 @@ def _over_frequency(ax: Axes, frequencies: np.ndarray, measured: dict[tuple[str,
 
 
 def _unsampled_damper(frequencies: np.ndarray) -> np.ndarray:
-    """Returns the energy that 0.8 N s/m take in 1 ms from a sine of 1 m, b omega^2 T / 2."""
+    """Returns the energy that 0.8 N s/m takes in 1 ms from a sine of 1 m, b omega^2 T / 2."""
     return 0.8 * (2.0 * np.pi * frequencies) ** 2 * PERIOD_S / 2.0
 
 
@@ -177,7 +177,7 @@ def _on_unidirectional(
 
 
 def _first_negative(frequencies: np.ndarray, taken: np.ndarray) -> float:
-    """Returns the frequency from which on it gives, between two that were tried; 0 if at all, infinite if at none."""
+    """Returns the frequency from which on it gives, between two that were tried; 0 if at the first, infinite if at none."""
     negative = taken < -1e-9 * np.abs(taken).max()
     if not negative.any() or negative[0]:
         return 0.0 if negative[0] else np.inf

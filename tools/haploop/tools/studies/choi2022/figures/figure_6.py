@@ -1,4 +1,4 @@
-"""Fig. 6: the paper's simulation, in our interpretation of what it leaves open, and in that nearest to the paper."""
+"""Fig. 6: the paper's simulation, in our interpretation of what it leaves open, and in the one nearest to the paper."""
 
 from __future__ import annotations
 
@@ -58,17 +58,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# The claims that the search tests under every interpretation, in its words.
+# The claims that the search tests under every interpretation, as it words them.
 _TESTED = CLAIMS | ASIDE
 _OURS, _NEAREST = "our interpretation", "[the nearest interpretation](#figure-6)"
-# A claim that holds as often as this, our own interpretation included, needs no assumption.
+# A claim that holds in this share of interpretations, and in our own, needs no assumption.
 _ALWAYS = 0.9
 _PANELS = {
     "a": "(a) 0.08 N/mm alone",
     "b": "(b) 0.15 N/mm, damping 0.8 N s/m",
     "c": "(c) 0.15 N/mm, unidirectional inertia 10 g",
 }
-# Least amplitude of a vibration that is felt (Israr, Choi and Tan 2006): at 10 Hz, m.
+# Least amplitude of a vibration that is felt (Israr, Choi and Tan 2006), at 10 Hz, m.
 _FELT_M = 26e-6
 _SETTLED_S, _HIGH_HZ, _NEARLY_ALL = 9.0, 50.0, 0.9
 
@@ -133,9 +133,9 @@ def _lines(table: Table) -> list[str]:
 
 
 def _verdict(work: Work, name: str, found: Found, there: Sequence[Option]) -> Finding:
-    """Finds that a claim holds if it does in our interpretation and nearly all; under an assumption if in some.
+    """Finds that a claim holds if it does in our interpretation and nearly all others; under an assumption if in some.
 
-    That is the nearest interpretation, or what the claim is likeliest with.
+    The assumption is the nearest interpretation, or the option with which the claim is likeliest.
     """
     rows, [base], [nearest] = found.of("random"), found.of("base"), found.of("nearest")
     claim, shared, decides = work.claims[name], interval(rows, name, SPACE), decider(there, name)
@@ -192,13 +192,13 @@ def _on_logs(work: Work, runs: Mapping[str, Mapping[str, Run]]) -> list[Finding]
 
 
 def _in_phase(log: Recording) -> float:
-    """Returns the share of the ticks with a force at which the acceleration has the direction of motion."""
+    """Returns the share of the ticks with a force at which the acceleration is in the direction of motion."""
     force, v, a = (log["/controller"][name] for name in ("dissipation.0", "v", "a"))
     return float(np.mean((v * a)[force != 0.0] >= 0.0))
 
 
 def _heat_over_leak(log: Recording) -> float:
-    """Returns the heat of both dampers over what the wall gave beyond what it took, in whole swings of the last second.
+    """Returns the heat of both dampers over the net energy that the wall gave, in whole swings of the last second.
 
     A swing begins where x rises through its mean.
     """
@@ -214,7 +214,7 @@ def _heat_over_leak(log: Recording) -> float:
 def _panels(runs: Mapping[str, Run]) -> Figure:
     """Draws position, force and energy of three runs, by "a", "b" and "c".
 
-    Positions have one scale, by where they swing in the second half: how they came there may run out of it.
+    All positions have one scale, chosen by the swing in the second half: the motion before may run out of it.
     """
     figure = empty_figure(14.0, 8.4)
     axes = figure.subplots(3, 3, sharex="col", squeeze=False)

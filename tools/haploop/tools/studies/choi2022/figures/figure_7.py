@@ -1,4 +1,4 @@
-"""Fig. 7 shows the experiments' device: here what nobody published of it, and the nearest interpretation."""
+"""Fig. 7 shows the experiments' device: here what was not published about it, and the nearest interpretation."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from haploop.tools.studies.choi2022.steadiness import largest
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Largest steady stiffness in N/m by element, and by key of a setup at a lower and an upper value of it.
+# Largest steady stiffness in N/m by element; and, by key of a setup, that at a lower and at an upper value of the key.
 Largest = dict[str, float]
 Influences = dict[str, tuple[Largest, Largest]]
 # Two values of a number, or two options of a choice.
@@ -49,10 +49,10 @@ _LOWER, _UPPER = "#56B4E9", "#E69F00"
 
 
 def make_7(work: Work) -> list[Finding]:
-    """Searches, varies each value by itself, and writes the nearest interpretation as a scene."""
+    """Searches, varies each value alone, and writes the nearest interpretation as a scene."""
     found = search(work)
     nearest, rows = setup_of(found.nearest), found.of("random")
-    # That of the nearest is among the rows once already.
+    # The nearest is among the other rows already.
     work.data("figure_7_interpretations", columns_of([row for row in found.rows if row["stage"] != "nearest"]))
     work.text(SHARES, shares_of(rows, work.small))
     work.scene(SCENE.removesuffix(".toml"), nearest.scene(5000.0))
@@ -96,7 +96,7 @@ def make_7(work: Work) -> list[Finding]:
 
 
 def _influences(work: Work, nearest: Setup) -> tuple[Largest, Influences, dict[str, Pair]]:
-    """Returns the largest steady stiffnesses of the nearest setup, at two values of each of its keys, and those."""
+    """Returns the largest steady stiffnesses of the nearest setup, those at two values of each key, and the values."""
     varied = _varied(nearest, work.small)
     ends: list[Row] = [nearest.as_dict() | {key: value} for key, pair in varied.items() for value in pair]
     base, *rest = _largest(work, [nearest, *(Setup(**end) for end in ends)])
@@ -108,7 +108,7 @@ def _influences(work: Work, nearest: Setup) -> tuple[Largest, Influences, dict[s
 
 
 def _largest(work: Work, setups: Sequence[Setup]) -> list[Largest]:
-    """Returns the largest steady stiffness of each element in each setup; those of one structure run together."""
+    """Returns the largest steady stiffness of each element in each setup; setups of one structure run together."""
     groups: dict[tuple[object, ...], list[Setup]] = {}
     for setup in dict.fromkeys(setups):
         structure = (setup.delay_s, setup.unit, setup.mount, setup.velocity, setup.acceleration)
@@ -123,7 +123,7 @@ def _largest(work: Work, setups: Sequence[Setup]) -> list[Largest]:
 
 
 def _varied(setup: Setup, small: bool) -> dict[str, Pair]:
-    """Returns for each value of a setup a lower and an upper one, or two other choices."""
+    """Returns for each value of a setup a lower and an upper value, or two other choices."""
     pairs: dict[str, Pair] = {
         key: (float(f"{getattr(setup, key) / _FACTOR:.3g}"), float(f"{getattr(setup, key) * _FACTOR:.3g}"))
         for key in SPACE.bounds

@@ -21,7 +21,7 @@ from haploop.tools.studies.choi2022.runs import Run, run, strongest_Hz
 from haploop.tools.studies.choi2022.sampled import DAMPING_N_S_M, PERIOD_S, bidirectional_J, closed_form
 
 LABELS = ("damping", "bidirectional inertia", "unidirectional inertia")
-# Relative to the energy moved, what rounding leaves of a sum that cancels.
+# Share of the energy moved that rounding leaves over in a sum that cancels.
 _ROUNDING = 1e-9
 _FREQUENCIES_HZ = np.linspace(2.3, 247.9, 492)
 # Ages of an acceleration: of a difference of differences, and of an MPU-9250 at its settings of 1046 and 420 Hz.
@@ -110,7 +110,8 @@ def _picture(work: Work, contacts: list[Contact]) -> None:
 def first_ahead_Hz(age_s: float | None) -> float:
     """Returns the lowest frequency below 250 Hz at which the paper's bidirectional inertia takes more than its damper.
 
-    Both from a sine, by the sampled books; the age of the acceleration is as of ``bidirectional_J``. NaN if none.
+    Both take it from a sine, by the sampled books; ``age_s`` is the age of the acceleration, as in ``bidirectional_J``.
+    NaN if there is none.
     """
     damped = BOOKED_DAMPING / DAMPING_N_S_M * closed_form("damping", 2.0 * np.pi * _FREQUENCIES_HZ * PERIOD_S, 0)
     over = BOOKED_KG * bidirectional_J(_FREQUENCIES_HZ, age_s) >= damped

@@ -40,7 +40,7 @@ _EDGE_S, _DURATION_S = 0.06, 0.9
 
 
 class Tuned(NamedTuple):
-    """The scene of a press on a wall, and what came of it."""
+    """The scene of a press on a wall, and its result."""
 
     scene: Scene
     result: Summary
@@ -70,7 +70,7 @@ class Tuned(NamedTuple):
 
 
 def make_9(work: Work) -> list[Finding]:
-    """Tunes each on a grid of sizes, runs the best of them, and inertia at the largest stiffness that it steadies."""
+    """Tunes both on a grid of sizes, runs the best of each, and inertia at the largest stiffness that it steadies."""
     here, ours = tuned(work, KINDS[1], 5000.0), tuned(work, KINDS[3], 5500.0)
     cases = {
         "damping": ("damping at 5.0 N/mm", here.scene),
@@ -78,7 +78,7 @@ def make_9(work: Work) -> list[Finding]:
     }
     _presses(work, cases)
     beyond, most = tuned(work, KINDS[1], 5500.0), reached(work, work.nearest, KINDS[3])
-    # What all starts leave at rest.
+    # The wall on which all starts come to rest.
     rest_N_m = max(min(most.steady), float(STIFFNESSES[0]))
     at_rest = pressed(work.nearest.scene(rest_N_m, elements_of(KINDS[3], *most.sizes)))
     rests = Tuned(at_rest, run_all([at_rest])[0])
@@ -100,7 +100,7 @@ def make_9(work: Work) -> list[Finding]:
 
 
 def make_12(work: Work) -> list[Finding]:
-    """Runs the paper's values, and the best of ours."""
+    """Runs the paper's values, and our best ones."""
     chosen = tuned(work, "both", PAIR_AT_N_M)
     b, mass_g = chosen.sizes["damping"], 1e3 * chosen.sizes["mass"]
     of_paper = pressed(work.nearest.scene(PAIR_AT_N_M, elements_of("both", *PAIR)))
@@ -112,7 +112,7 @@ def make_12(work: Work) -> list[Finding]:
     (best, paper), press = (Tuned(ran.scene, ran.summary) for ran in runs), Press.from_run(runs[0])
     off = abs(best.displayed_N_m / PAIR_AT_N_M - 1.0)
     inside = press.displayed_N_m[press.output_N != 0.0]
-    # How soon it is displayed; damping and inertia may display more at first.
+    # How soon the stiffness is displayed; damping and inertia may display more at first.
     rises, settles = (int(np.argmax(of)) for of in (inside > 0.5 * PAIR_AT_N_M, abs(inside / PAIR_AT_N_M - 1.0) < 0.5))
     holding = {"displayed": best.steady and off < 0.01, "values": paper.steady, "instant": rises <= 2}
     return work.findings(
@@ -196,7 +196,7 @@ def _presses(work: Work, cases: Mapping[str, tuple[str, Scene]]) -> list[Run]:
         press = Press.from_run(runs[-1])
         word = "steady" if is_steady(runs[-1].summary) else "not steady"
         _draw(column[0], column[1], press, f"{heading}: {word}", wall_of(scene).stiffness)
-        # Outside the wall the displayed stiffness is 0 there.
+        # The displayed stiffness is written as 0 outside the wall.
         columns |= {f"{key}_{name}": np.nan_to_num(column) for name, column in press._asdict().items()}
         work.scene(f"{name}_{key}", scene)
     legend(axes[0, 0], loc="upper right", ncols=3, **INSIDE)
@@ -209,7 +209,7 @@ class Press(NamedTuple):
     """The signals of a run that presses on a wall.
 
     Attributes:
-        t_s: of the ticks.
+        t_s: times of the ticks.
         origin_N, element_N, output_N: force of the wall's spring, of all elements, and their sum.
         displayed_N_m: output over penetration, NaN outside the wall (Choi et al. 2022, V.B.2).
     """

@@ -1,4 +1,4 @@
-"""The page of a builder, and that with every claim and figure behind it, from what the figures came to."""
+"""The page for builders, and the page with every claim and figure behind it, from the results of the figures."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from haploop.tools.studies.choi2022.figures.claims import (
 )
 from haploop.tools.studies.choi2022.figures.work import Kept
 
-# The page that is read in five minutes, and that with every claim and figure.
+# The page that is read in five minutes, and the one with every claim and figure.
 PAGE, CLAIMS_PAGE = "paper.md", "paper_claims.md"
-# What the first page shows: the ranges of the elements, and which of them wins.
+# Figures on the first page: the ranges of the elements, and which of them wins.
 _SHOWN = (10, 14)
 
 
 def made(directory: Path) -> dict[int, Kept]:
-    """Returns what the directory holds, by the number of the figure."""
+    """Returns the figures that the directory holds, by number."""
     files = ((number, directory / f"figure_{number}.json") for number in numbers())
     return {number: json.loads(file.read_text(encoding="utf-8")) for number, file in files if file.exists()}
 
 
 def write_pages(kept: Mapping[int, Kept], folder: Path, pictures: str = "") -> Path:
-    """Writes both pages of what was made, and returns the first.
+    """Writes both pages from the figures that were made, and returns the first.
 
-    ``pictures`` is where the pictures lie, seen from the pages, with a slash at the end.
+    ``pictures`` is the path from the pages to the pictures, with a slash at the end.
     """
     (folder / CLAIMS_PAGE).write_text(claims_page(kept, pictures), encoding="utf-8")
     (folder / PAGE).write_text(page(kept, pictures), encoding="utf-8")
@@ -60,7 +60,7 @@ def page(kept: Mapping[int, Kept], pictures: str = "") -> str:
             for number, one in sorted(kept.items())
             if one["answer"] and one["supports"] == supports
         ]
-        # The last figures are nearest to a device that is to be built.
+        # The last figures are closest to a device that is to be built.
         parts += [f"## {heading}", "\n".join(answers if supports else reversed(answers))] if answers else []
     parts += [f"## {texts['sure_title']}", texts["sure"], texts["fair"]]
     for number in _SHOWN:
@@ -70,7 +70,7 @@ def page(kept: Mapping[int, Kept], pictures: str = "") -> str:
 
 
 def claims_page(kept: Mapping[int, Kept], pictures: str = "") -> str:
-    """Returns the page behind it: the finding of every claim, then all figures."""
+    """Returns the page behind the first: the finding of every claim, then all figures."""
     texts, rows = texts_of("page"), _rows(kept)
     parts = ["# The paper, claim by claim", texts["claims_intro"], *_trial(kept), "## Claims", *_tables(rows)]
     if missing := [f"{number} ({len(claims_of(number))} claims)" for number in numbers() if number not in kept]:
@@ -91,7 +91,7 @@ def _trial(kept: Mapping[int, Kept]) -> list[str]:
 
 
 def _tables(rows: list[tuple[int, Finding]]) -> list[str]:
-    """Returns how many claims there are, and a table for each section of the paper, in its order; within it by figure.
+    """Returns the number of claims, and a table for each section of the paper, in its order; each ordered by figure.
 
     The section of a claim at ``V.B.2, Fig. 8`` is ``V.B``.
     """
@@ -113,7 +113,7 @@ def _tables(rows: list[tuple[int, Finding]]) -> list[str]:
 
 
 def _figure(number: int, one: Kept, pictures: str) -> list[str]:
-    """Returns heading, pictures with what is seen on them, notes, and which files hold data and scenes."""
+    """Returns heading, pictures with what they show, notes, and the names of the files with data and scenes."""
     shown = [name for name in one["files"] if name.endswith(".png")]
     others = ", ".join(f"`{name}`" for name in one["files"] if name not in shown)
     parts = [f'<a id="figure-{number}"></a>', f"### Figure {number}: {one['title']}"]

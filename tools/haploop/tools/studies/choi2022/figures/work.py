@@ -1,4 +1,4 @@
-"""A figure in the making: its texts and claims, and the files it leaves."""
+"""A figure while it is being made: its texts and claims, and the files that it writes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NEAREST = "[the nearest interpretation of the device](#figure-7)"
 
 
 class Kept(TypedDict):
-    """What the page needs of a figure, as figure_N.json holds it."""
+    """The data of a figure that the page needs, as figure_N.json holds them."""
 
     number: int
     title: str
@@ -44,11 +44,11 @@ class Work(Answers):
     """The means and the results of one figure; its calculations go through ``map_parallel``.
 
     Attributes:
-        texts: of the figure, by name: its title among them.
-        claims: that it tests, by name.
-        answer: what a builder of devices can take from it, in a sentence or two; empty for what has none.
+        texts: texts of the figure by name, its title among them.
+        claims: claims that it tests, by name.
+        answer: what a builder of devices can take from it, in a sentence or two; empty if there is none.
         supports: whether the answer says that what the paper claims holds.
-        caption: what is to be seen, in a sentence or two; that of the texts unless set.
+        caption: what the figure shows, in a sentence or two; that of the texts unless set.
         notes: whole sections in Markdown that go below the figure on the page.
     """
 
@@ -68,29 +68,29 @@ class Work(Answers):
         return nearest(self)
 
     def path(self, name: str) -> Path:
-        """Returns the path of a file, noted as one that belongs to this figure."""
+        """Returns the path of a file, and records that it belongs to this figure."""
         if name not in self._files:
             self._files.append(name)
         return self.out / name
 
     def tell(self, name: str, /, **computed: Any) -> str:
-        """Returns one of the texts with what was computed in the place of names in braces."""
+        """Returns one of the texts, with computed values in place of the names in braces."""
         return self.texts[name].format(**computed)
 
     def conclude(self, name: str = "", /, *, supports: bool, **computed: Any) -> None:
-        """Sets the answer: the text ``answer``, or ``answer_NAME`` of several, which the caller chooses by a rule."""
+        """Sets the answer: the text ``answer``, or of several ``answer_NAME``, which the caller chooses by a rule."""
         self.answer, self.supports = self.tell(f"answer_{name}" if name else "answer", **computed), bool(supports)
 
     def text(self, name: str, text: str) -> None:
         self.path(name).write_text(text, encoding="utf-8")
 
     def figure(self, figure: Figure, name: str, seen: str = "") -> None:
-        """Writes a picture, ``name`` without its suffix; what is seen on it goes below it."""
+        """Writes a picture, ``name`` without its suffix; ``seen`` says what it shows, and goes below it."""
         write_figure(figure, self.path(f"{name}.png"))
         self._seen[f"{name}.png"] = seen
 
     def data(self, name: str, columns: Mapping[str, ArrayLike]) -> None:
-        """Writes arrays by name; the unit stands at the end of each name."""
+        """Writes arrays by name; each name ends with the unit."""
         arrays = {key: np.asarray(value) for key, value in columns.items()}
         np.savez_compressed(self.path(f"{name}.npz"), allow_pickle=True, **arrays)
 
@@ -98,7 +98,7 @@ class Work(Answers):
         self.text(f"{name}.toml", to_toml(scene.as_dict()))
 
     def findings(self, holding: Mapping[str, bool], /, **computed: Any) -> list[Finding]:
-        """Finds of some claims, given whether they hold under the nearest interpretation of the experiments."""
+        """Returns findings on claims, given whether each holds under the nearest interpretation of the experiments."""
         return [self.finding(self.claims[name], is_so, **computed) for name, is_so in holding.items()]
 
     def finding(self, claim: Claim, is_so: bool, /, **computed: Any) -> Finding:
@@ -107,7 +107,7 @@ class Work(Answers):
         Args:
             claim: its assumption is what is assumed besides the nearest interpretation.
             is_so: whether it holds under the nearest.
-            computed: what the claim's words name, for the nearest.
+            computed: values that the claim's words name, for the nearest.
         """
         kept, numbers = shares_in(self.out, self.small), claim.numbers.format(**computed)
         here = NEAREST + claim.assumption.format(**computed) if is_so else ""
@@ -123,7 +123,7 @@ class Work(Answers):
         return Finding.by_share(claim, numbers, found["share"], here or another)
 
     def keep(self, findings: Sequence[Finding]) -> None:
-        """Writes what the page needs: figure_N.json."""
+        """Writes the data that the page needs: figure_N.json."""
         kept: Kept = {
             "number": self.number,
             "title": self.texts["title"],
