@@ -85,7 +85,7 @@ def _draw_energies(body: SubFigure, outcome: Outcome) -> None:
 
 
 def _motion(ax: Axes, outcome: Outcome, lines: Floats, title: str, whole: bool) -> None:
-    """Draws position over time with the wall in view; the ``whole`` motion as far as the wall, and with its buzzes."""
+    """Draws position over time, with the wall as far as it is in view; if ``whole``, up to the wall and with buzzes."""
     factor, letter = prefix_for([float(np.abs(lines[1]).max())])
     t, x = lines[0], lines[1] / factor
     low, high = float(x.min()), float(x.max())

@@ -193,7 +193,7 @@ class BuzzFinder:
         return self._several.found(self._slower())[0]
 
     def fast_rms_m(self) -> float:
-        """Returns the largest r.m.s. motion above 15 Hz that all windows of one second reach; 0 for less than a second."""
+        """Returns the largest r.m.s. motion above 15 Hz that all windows of a second reach; 0 for less than that."""
         rows = [min(self._fast_m[at : at + NEEDED + 1]) for at in range(len(self._fast_m) - NEEDED)]
         return max(rows, default=0.0)
 

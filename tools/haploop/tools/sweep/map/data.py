@@ -109,7 +109,7 @@ class Panel:
     """A part of a sweep whose cells share the values of all axes but those along it.
 
     Attributes:
-        titles: these values in words, in full and ever shorter; empty where there are none.
+        titles: these values in words, in full and ever shorter; empty words where there are none.
         cells: of shape (x values, y values) or (x values,).
     """
 
@@ -173,7 +173,7 @@ class MapData:
         return self.sweep.get("base", {}).get("run", {}).get("verdict") == "window"
 
     def word(self, verdict: int) -> str:
-        """Returns a verdict in words; where no run was pushed, what the window shows."""
+        """Returns a verdict in words; where no run was pushed, what its window shows."""
         word = VERDICTS[verdict]
         return (OF_WINDOW.get(word, word) if self.is_unpushed else word).replace("-", " ")
 

@@ -177,7 +177,7 @@ def _on_unidirectional(
 
 
 def _first_negative(frequencies: np.ndarray, taken: np.ndarray) -> float:
-    """Returns the frequency from which on it gives, between two that were tried; 0 if at the first, infinite if at none."""
+    """Returns the frequency from which on it gives, between two that were tried; 0 if at the first, else infinite."""
     negative = taken < -1e-9 * np.abs(taken).max()
     if not negative.any() or negative[0]:
         return 0.0 if negative[0] else np.inf
