@@ -142,7 +142,7 @@ def _slower(outcome: Outcome, also: str = "") -> str:
 
 
 def buzzing(outcome: Outcome) -> list[tuple[float, float, str]]:
-    """Returns each stretch in which the recording buzzes: its begin and end, s, and its frequencies in words."""
+    """Returns each stretch in which the recording buzzes: its start and end, s, and its frequencies in words."""
     if several := outcome.several:
         return [(several.from_s, several.to_s, " and ".join(f"{at_Hz:.1f} Hz" for at_Hz, _ in several.lines))]
     if not (buzz := outcome.buzz):

@@ -45,7 +45,7 @@ SLOWER = Band(2.0, ABOVE_HZ + 1.0, LASTS_S, 0.5, 5)
 
 
 class Span(NamedTuple):
-    """A stretch in which it buzzes: begin and end, s, the windows' least and greatest frequency, and largest width."""
+    """A stretch in which it buzzes: start and end, s, the windows' least and greatest frequency, and largest width."""
 
     from_s: float
     to_s: float

@@ -7,7 +7,7 @@ import numpy as np
 from haploop.logger.verdict.about_trend import about_trend
 from haploop.tools.dissipate.recording.samples import Floats
 
-# A force gives to the swing, or takes from it, from this share on of the most that it could.
+# A force counts as giving to the swing, or taking from it, if it does so by this share of the most that it could.
 LEAST_FED = 0.01
 # A swing has its own frequency and the overtones that shape it; higher overtones hold less than the noise of all lines.
 _ORDERS = range(1, 6)

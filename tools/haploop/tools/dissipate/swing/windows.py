@@ -25,7 +25,7 @@ class Window(NamedTuple):
 
     Attributes:
         from_s, to_s: where the swing began if this is the first of its stretch, and ended if it is the last.
-        at_s: begin and length of the window.
+        at_s: start and length of the window.
         width_m: greatest width, peak to peak: that of the window's sine or, where it changes within the window, of its
             widest part.
     """
