@@ -7,15 +7,13 @@ from dataclasses import replace
 from functools import reduce
 
 from haploop.launch.stability.finding import DOES, Finding
-from haploop.launch.stability.looks import LOOKS_S, SMALLER, push_of
+from haploop.launch.stability.looks import LOOKS_S, push_of
 from haploop.launch.stability.still_hand import End, continue_plant
 from haploop.launch.stability.watch import watch
 from haploop.protocol.ticks import DELAY
 
 # An encoder so many times as fine has no counts that a hand could feel.
 FINER = 1000.0
-# A trial that does not tell by then is undecided.
-_LOOKS_S = LOOKS_S
 ALL = "all"
 
 
@@ -23,9 +21,10 @@ def with_causes(end: End, found: Finding) -> Finding:
     """Returns the finding of a loop that swings with what the loop does without each of its parts.
 
     The swing goes on from the end of the run; one part is taken out, the hand is held and pushed as for the verdict,
-    and the loop is watched for up to 4 s. Parts are the round-trip delay, the counts of the encoder (made ``FINER``
-    times as fine) and the dissipation elements. Where the loop swings on without any one of several, it is tried
-    without all of them. What then is left is the hold of each force over a tick, and what else the scene simulates.
+    by the larger push alone, and the loop is watched for up to 16 s. Parts are the round-trip delay, the counts of the
+    encoder (made ``FINER`` times as fine) and the dissipation elements. Where the loop swings on without any one of
+    several, it is tried without all of them. What is left then is the hold of each force over a tick, and what else
+    the scene simulates.
     """
     if found.word not in ("limit-cycle", "growing"):
         return found
@@ -38,7 +37,7 @@ def with_causes(end: End, found: Finding) -> Finding:
 
 def _does(end: End) -> str:
     push_N = push_of(end.hold_N, end.scene.hand, end.wall_m)
-    return DOES.get(watch(end, (push_N * SMALLER, push_N), _LOOKS_S)[0].word, "undecided")
+    return DOES.get(watch(end, (push_N,), LOOKS_S)[0].word, "undecided")
 
 
 def _delay_steps(end: End) -> int:
