@@ -1,4 +1,4 @@
-"""A plant's conversation with the clock of a run: joins, hears what is granted, reports. Imports nothing of haploop."""
+"""A plant's conversation with the clock of a run: joins, receives grants, reports. Imports nothing of haploop."""
 
 import math
 import os
@@ -13,11 +13,11 @@ DELAY = "clock.round_trip_delay"
 
 
 class Clock:
-    """What is granted so far, and the delays set on the way, [tick, s] each."""
+    """The ticks granted so far, and the delays set during the run, [tick, s] each."""
 
     def __init__(self, sockets, address):
         self._socket = sockets.open(zmq.DEALER)
-        self._socket.sndtimeo = 20_000  # one that the clock's keys turn away is connected to nothing
+        self._socket.sndtimeo = 20_000  # a socket that the clock's keys reject is connected to nothing
         sockets.connect(self._socket, address)
         self.until, self.last, self.delays = 0, False, []
         self._heard, self._silence_s = time.monotonic(), math.inf
@@ -39,11 +39,11 @@ class Clock:
                 raise SystemExit(fields[0])
 
     def give_up_after(self, silence_s):
-        """Has this process end when nothing was heard of the clock for so long, where no end of stdin would tell."""
+        """Makes this process end after such a silence of the clock, for runs in which no end of stdin would show it."""
         self._silence_s = silence_s
 
     def listen(self, wait_ms=0):
-        """Takes what the clock has sent, waits for the first message for at most so long; tells whether any came."""
+        """Takes the messages of the clock, waiting at most ``wait_ms`` for the first; tells whether any came."""
         heard = False
         while self._socket.poll(wait_ms):
             _, code, *fields = msgpack.unpackb(self._socket.recv(), strict_map_key=False)
@@ -57,7 +57,7 @@ class Clock:
         return heard
 
     def wait(self, tick, on):
-        """Says that this is alive and waits for another."""
+        """Reports that this node is alive and waits for another; takes what the clock has sent."""
         self.say(WAITING, tick, on)
         self.listen()
         if time.monotonic() - self._heard > self._silence_s:

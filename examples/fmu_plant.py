@@ -2,11 +2,11 @@
 
     haploop run scene.toml --node plant="python examples/fmu_plant.py device.fmu --force F --position x --velocity v"
 
-Needs fmpy (pip install 'haploop[fmu]' brings it), pyzmq and msgpack. The FMU is the device with the hand's mass, damper
-and spring; the force of the hand's muscles, where the scene has one, is added to the force. An element of an array is
-named by its number from 1 on, as in y[2]. Without --velocity it is the difference of positions over a plant step, which
-the books will tell. A step of co-simulation is a plant step of the scene; an FMU for model exchange is moved by one of
-Runge-Kutta 4.
+Needs fmpy (pip install 'haploop[fmu]' installs it), pyzmq and msgpack. The FMU is the device with the hand's mass,
+damper and spring; the force of the hand's muscles, if the scene has one, is added to the force. An element of an array
+is named by its number, counted from 1, as in y[2]. Without --velocity, the velocity is the difference of positions over
+a plant step, which will show in the books. A step of co-simulation is a plant step of the scene; an FMU for model
+exchange is moved by one step of Runge-Kutta 4.
 """
 
 import argparse
@@ -39,7 +39,7 @@ def main():
 
 
 def device(scene, step_s, options, folder):
-    """Returns the function of a plant step, and position and velocity at the start; the FMU is unpacked in a folder."""
+    """Returns the function of a plant step, and position and velocity at the start; unpacks the FMU in ``folder``."""
     values, bias = dict(options.set), 0.0
     if options.state_space:
         options.force, options.position, options.velocity = "u[1]", "y[1]", "y[2]"
@@ -78,7 +78,7 @@ def assignment(text):
 
 
 def state_space(scene):
-    """Returns the matrices of three states, two of them used, for m x'' + b x' + k (x - rest) = u; and k rest."""
+    """Returns the matrices of three states, two of them used, for m x'' + b x' + k (x - rest) = u; and k * rest."""
     plant, hand = scene["device"], scene.get("hand") or {}
     m, b = (plant[key] + hand.get(key, 0.0) for key in ("mass", "damping"))
     k, x, v = hand.get("stiffness", 0.0), plant.get("position", 0.0), plant.get("velocity", 0.0)
@@ -87,7 +87,7 @@ def state_space(scene):
 
 
 class Unit:
-    """An FMU by the names of its variables, up to the end of its initialization."""
+    """An FMU accessed by the names of its variables; the constructor completes its initialization."""
 
     def __init__(self, made, description, identifier, options, values, folder):
         self._variables = {variable.name: variable for variable in description.modelVariables}
@@ -107,7 +107,7 @@ class Unit:
         self.fmu.exitInitializationMode()
 
     def _place(self, name):
-        """Returns reference, index and size of a variable, or of the array of which ``name`` is an element."""
+        """Returns reference, index and size of a variable; ``name`` may be an element of an array."""
         base, _, number = (name, "", "") if name in self._variables else name.removesuffix("]").partition("[")
         if base not in self._variables:
             raise SystemExit(f"The FMU has no variable {name}; it has {', '.join(self._variables)}.")
@@ -133,7 +133,7 @@ class Unit:
 
 
 class CoSimulation(Unit):
-    """An FMU that moves by itself, under the mean of the forces at the ends of a step."""
+    """An FMU with its own solver, driven by the mean of the forces at both ends of a step."""
 
     def __init__(self, *about):
         super().__init__(FMU3Slave, *about)
@@ -146,7 +146,7 @@ class CoSimulation(Unit):
 
 
 class ModelExchange(Unit):
-    """An FMU that tells rates, moved by Runge-Kutta 4; its events are handled at the ends of plant steps."""
+    """An FMU that gives rates, moved by Runge-Kutta 4; its events are handled at the ends of plant steps."""
 
     def __init__(self, *about):
         super().__init__(FMU3Model, *about)

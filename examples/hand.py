@@ -5,7 +5,7 @@ from bisect import bisect_right
 
 
 def hand_force(scene):
-    """Returns the force of the hand's muscles, N, as a function of the time in s, as [hand.force] of a scene has it."""
+    """Returns the force of the hand's muscles, N, as a function of time in s, as defined by [hand.force]."""
     table = (scene.get("hand") or {}).get("force") or {"kind": "constant", "value": 0.0}
     kind, value = table["kind"], table.get("value", 0.0)
     if kind == "constant":

@@ -12,16 +12,16 @@ SAY_MS = 200
 
 
 class SeatError(Exception):
-    """What is wrong, in a sentence; reported to the clock as the reason of the failure."""
+    """A failure described in a sentence, which is reported to the clock as its reason."""
 
 
 class Loop:
-    """A ROUTER that knows the controller by the run's secret; `idle` is called while it is silent."""
+    """A ROUTER that recognises the controller by the run's secret; calls `idle` while the controller is silent."""
 
     def __init__(self, sockets, secret, idle):
         self._socket, self._secret, self._idle = sockets.open(zmq.ROUTER), secret, idle
         self._socket.router_mandatory = True
-        self._socket.sndhwm = self._socket.rcvhwm = 0  # a plant that owns the time sends on while answers are late
+        self._socket.sndhwm = self._socket.rcvhwm = 0  # a plant that owns the time keeps sending while answers are late
         self.address, self._partner = sockets.bind(self._socket, "loop"), None
 
     def greet(self):
@@ -33,7 +33,7 @@ class Loop:
                 self.send(HELLO, self._secret)
 
     def ready_by(self, when):
-        """Waits for a message up to a time, s of time.monotonic(), to less than a ms; tells whether there is one."""
+        """Waits for a message until ``when``, s of time.monotonic(), to less than a ms; tells whether there is one."""
         while not self._socket.getsockopt(zmq.EVENTS) & zmq.POLLIN:
             if (left := when - time.monotonic()) <= 0.0:
                 return False
@@ -43,11 +43,11 @@ class Loop:
     def send(self, *message):
         try:
             self._socket.send_multipart([self._partner, pack(*message)])
-        except zmq.ZMQError:  # the controller has gone, which the clock sees too
+        except zmq.ZMQError:  # the controller is gone; the clock notices this, too
             self._idle()
 
     def answer(self, tick):
-        """Returns the force that answers the sample of a tick, N; None for what a stranger has sent."""
+        """Returns the force that answers the sample of a tick, N; None for a message from a stranger."""
         sender, frame = self._hear()
         if sender != self._partner:
             return None

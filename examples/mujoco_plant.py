@@ -2,7 +2,7 @@
 
     haploop run scene.toml --node plant="python examples/mujoco_plant.py --integrator rk4"
 
-Needs mujoco, pyzmq and msgpack (pip install 'haploop[mujoco]' brings them). The joint is the device, at
+Needs mujoco, pyzmq and msgpack (pip install 'haploop[mujoco]' installs them). The joint is the device, at
 x = radius * angle; the scene's hand (mass, damper, spring, force) is attached to it rigidly. MuJoCo's step is the plant
 step of the scene.
 """
@@ -19,7 +19,7 @@ SLIDER = """<mujoco><worldbody><body>
   <joint name="slider" type="slide" axis="1 0 0" damping="{damping!r}"/>
   <inertial pos="0 0 0" mass="{mass!r}" diaginertia="1 1 1"/>
 </body></worldbody></mujoco>"""
-# A forearm that turns about the vertical, the hand 0.2 m from the elbow: 10 g and 0.1 N s/m seen from there.
+# A forearm that turns about the vertical, with the hand 0.2 m from the elbow: 10 g and 0.1 N s/m as seen at the hand.
 ARM = """<mujoco><worldbody><body>
   <joint name="elbow" type="hinge" axis="0 0 1" damping="0.004"/>
   <inertial pos="0.1 0 0" mass="0.03" diaginertia="1e-5 1e-4 1e-4"/>

@@ -5,17 +5,17 @@ import time
 from collections import Counter
 from itertools import accumulate
 
-# Ticks held up for no longer than this are made up for at once, s; the rest of the time is lost.
+# Ticks held up for no longer than this are caught up at once, s; any further time is lost.
 CATCH_UP_S = 0.02
-# Figures go out so often, s.
+# Time between reports of the figures, s.
 EVERY_S = 1.0
 
 
 class Schedule:
-    """When each tick is due, and how long after its tick each answer was there, in classes 5 % wide.
+    """When each tick is due, and how long after its tick each answer arrived, in classes 5 % wide.
 
-    Ticks are due every period, whatever becomes of them. What this process was held up for beyond CATCH_UP_S is lost:
-    all ticks to come are due later by it.
+    Ticks are due every period, whatever happens to them. Time for which this process was held up beyond CATCH_UP_S is
+    lost: all later ticks are due later by that time.
     """
 
     def __init__(self, period_s, late_s):
@@ -24,7 +24,7 @@ class Schedule:
         self._classes, self._late, self._most_s = Counter(), 0, 0.0
 
     def begin(self, tick):
-        """Begins a tick, now; the first one begins the schedule."""
+        """Begins a tick now; the first one begins the schedule."""
         now = time.monotonic()
         if self._began is None:
             self._began = now - tick * self._period_s
@@ -37,20 +37,20 @@ class Schedule:
         return self._began + tick * self._period_s
 
     def answered(self, tick, is_late):
-        """Notes that the answer to the sample of a tick has come; late, if its force was to act before."""
+        """Records that the answer to the sample of a tick has come; late if its force was to act before."""
         after_s = time.monotonic() - self.due(tick)
         self._classes[math.ceil(math.log(max(after_s, 1e-6) / 1e-6, 1.05))] += 1
         self._late, self._most_s = self._late + is_late, max(self._most_s, after_s)
 
     def says_so(self):
-        """Tells, once a second, that it is time to tell the figures."""
+        """Tells whether it is time to report the figures, which is once a second."""
         if (now := time.monotonic()) < self._said + EVERY_S:
             return False
         self._said = now
         return True
 
     def figures(self):
-        """Returns the figures as a run of the launcher's own pace has them, in s; {} before the first answer."""
+        """Returns the same figures as a run at the launcher's pace reports, in s; {} before the first answer."""
         ticks = self._classes.total()
         if not ticks:
             return {}

@@ -1,4 +1,4 @@
-"""A plant's seat in a run: all of protocol/README.md that a device in Python needs. Imports nothing of haploop.
+"""A plant's seat in a run: everything in protocol/README.md that a device in Python needs. Imports nothing of haploop.
 
 A device is a function from the force held over a plant step, N, to position and velocity after it, m and m/s:
 
@@ -22,18 +22,18 @@ from schedule import Schedule
 from sockets import Sockets
 from telemetry import BLOCK_S, LONG_BLOCK_S, Telemetry
 
-# What of a scene is not the plant's, or needs no more of it than one force in and one position out.
+# Tables of a scene that do not concern the plant, or that need no more than one force in and one position out.
 KNOWN = {"title", "duration", "seed", "diverged_beyond", "clock", "device", "hand", "encoder", "run"}
 KNOWN |= {"wall", "velocity", "acceleration", "dissipation", "event"}
-# A controller that has not answered for so long does not lead a device any more.
+# A controller that has not answered for this long, s, no longer commands a device.
 PATIENCE_S = 1.0
 
 
 def take_seat(name, version):
-    """Starts as a node of a run is started, joins it, and returns the seat.
+    """Joins the run as the node that this process was started as, and returns the seat.
 
-    The last argument is the directory for sockets, and stdin brings a line of JSON (--node); or it is the file
-    external-plant.json that a run with --external plant has written.
+    The last word of the command line is the directory for sockets, with a line of JSON on stdin (--node); or it is the
+    file external-plant.json that a run with --external plant has written.
     """
     if len(sys.argv) < 2:
         raise SystemExit(f'This is started by: haploop run SCENE --node plant="python {sys.argv[0]} ..."')
@@ -54,7 +54,7 @@ def _end_with_launcher(seat):
 
 
 class Seat:
-    """The plant of a run, but for its device.
+    """The plant of a run, without its device.
 
     Attributes:
         scene: the resolved scene, tables as dicts, SI units.
@@ -93,11 +93,11 @@ class Seat:
     # The run
 
     def run(self, step, x, v, hold=lambda force: None):
-        """Goes through the run with a device at x, v (m, m/s) and reports to the clock how that ended.
+        """Runs to the end with a device that starts at x, v (m, m/s), and reports to the clock how the run ended.
 
         Args:
             hold: called at every tick of a run whose plant owns the time, with the force from now on, N; and with 0
-                at the end, however that comes.
+                at the end, however the run ends.
         """
         self.hold = hold
         try:
@@ -113,7 +113,7 @@ class Seat:
         self._sockets.close()
 
     def fail(self, why):
-        """Tells the clock why there is no going on, and ends this process."""
+        """Reports to the clock why the run cannot continue, and ends this process."""
         self._clock.say(FAILED, -1, why)
         self._sockets.close()
         raise SystemExit(1)
@@ -142,7 +142,7 @@ class Seat:
             if self._telemetry.is_due():
                 self._flush()
                 self._clock.listen()
-        if self._owns_time:  # answers that were due before the end, and have not come
+        if self._owns_time:  # answers that were due before the end and have not come
             for tick in range(self._answered, self._tick - self._delay // self._n):
                 self._schedule.answered(tick, True)
         self._loop.send(LAST, self._tick)
@@ -169,13 +169,13 @@ class Seat:
         return ""
 
     def _take_due(self, now):
-        """Holds the command that takes effect at a plant step; where its answer has not come, the safe force, 0."""
+        """Holds the command that takes effect at a plant step; if its answer has not come, the safe force, 0."""
         while self._coming and self._coming[0][0] <= now:
             _, force, command = self._coming.popleft()
             self._force, self._command = (0.0, -1) if force is None else (force, command)
 
     def _interval(self, step):
-        """Moves the device from this tick to the next; returns why the run has to end there, "" where it need not."""
+        """Moves the device from this tick to the next; returns why the run has to end there, or "" if it need not."""
         limit, at = self.scene["diverged_beyond"], self._tick * self._n
         for now in range(at, at + self._n):
             self._take_due(now)
@@ -237,14 +237,14 @@ class Seat:
             self._clock.wait(self._tick, "logger")
 
     def _flush(self):
-        """Publishes what was done since the last block, and reports it to the clock."""
+        """Publishes the steps since the last block, and reports them to the clock."""
         if self._telemetry.flush():
             status = {"lateness": self._schedule.figures()} if self._owns_time and self._schedule.says_so() else {}
             self._clock.say(PROGRESS, self._tick, status)
 
 
 def _beyond(scene):
-    """Returns the first key of a scene that asks for more than this seat has, None where none does."""
+    """Returns the first key of a scene that needs more than this seat offers, None if there is none."""
     if extra := sorted(scene.keys() - KNOWN):
         return extra[0]
     if "grip" in (scene.get("hand") or {}):

@@ -1,14 +1,14 @@
-"""Sockets of a seat: local files, or TCP with or without CURVE keys, as the line that starts a node says."""
+"""Sockets of a seat: local files, or TCP with or without CURVE keys, as the line of JSON that starts a node says."""
 
 import msgpack
 import zmq
 from zmq.auth.thread import ThreadAuthenticator
 
 VERSION = 1
-# With a port in the transport each socket has its own, in this order from that one on.
+# If the transport names a port, the sockets have consecutive ports from there on, in this order.
 PORTS = ("clock", "loop", "plant", "controller", "logger")
 BINDS = (zmq.ROUTER, zmq.XPUB)
-# So long what was sent may still take to go out to a logger that is held up.
+# Time that messages may still take to reach a logger that is held up.
 LINGER_MS = 20000
 
 
@@ -18,19 +18,19 @@ def pack(*message):
 
 
 class Sockets:
-    """Opens and binds sockets of one run; `transport` is that of the line."""
+    """Opens and binds the sockets of one run; `transport` is the entry of the line of JSON."""
 
     def __init__(self, directory, transport):
         self._directory, self._context, self._authenticator = directory, zmq.Context(), None
         self._host, self._port, self._keys = (transport.get(key) for key in ("host", "port", "keys"))
         self._patience_ms = max(2, int(1000 * transport.get("patience_s", 5.0)))
-        if self._keys:  # without a handler CURVE lets in any key
+        if self._keys:  # without a handler CURVE accepts any key
             self._authenticator = ThreadAuthenticator(self._context)
             self._authenticator.start()
             self._authenticator.configure_curve_callback(credentials_provider=self)
 
     def callback(self, _domain, key):
-        """Tells whether a key is known; the authenticator asks."""
+        """Tells whether a key is known; called by the authenticator."""
         return key.decode() in self._keys["known"].values()
 
     def open(self, kind):
@@ -61,7 +61,7 @@ class Sockets:
         return socket.last_endpoint.rstrip(b"\0").decode()
 
     def close(self):
-        """Lets what was sent go out, and ends everything."""
+        """Waits until sent messages have gone out, for at most LINGER_MS, and closes everything."""
         if self._authenticator:
             self._authenticator.stop()
         self._context.destroy(linger=LINGER_MS)

@@ -7,13 +7,13 @@ from sockets import pack
 
 STATE, PLANT_BLOCK, END = 30, 31, 34
 NAMES = ("x", "v", "force", "command")
-# A block holds the ticks of so much wall time, s, if not the most that the scene allows; of more where the plant owns
-# the time, since the logger may then be behind by a whole window of blocks.
+# Wall time, s, whose ticks make a block, unless the scene's limit comes first; it is longer if the plant owns the time,
+# since the logger may then be behind by a whole window of blocks.
 BLOCK_S, LONG_BLOCK_S = 0.01, 0.05
 
 
 class Telemetry:
-    """A plant's stream of blocks, on an XPUB; `state` returns tick, x, v, force held and its command, as they are."""
+    """A plant's stream of blocks, on an XPUB; `state` returns the present tick, x, v, held force and its command."""
 
     def __init__(self, socket, most_ticks, state, block_s):
         self._socket, self._most_ticks, self._state, self._block_s = socket, most_ticks, state, block_s
@@ -25,12 +25,12 @@ class Telemetry:
         self._rows = [array("d") for _ in NAMES]
 
     def note(self):
-        """Notes the state at the beginning of a plant step."""
+        """Records the state at the beginning of a plant step."""
         for column, value in zip(self._rows, self._state()[1:], strict=True):
             column.append(value)
 
     def is_due(self):
-        """Tells whether what was noted makes a block."""
+        """Tells whether the recorded steps make a block."""
         return self._state()[0] - self.first >= self._most_ticks or time.monotonic() - self._began > self._block_s
 
     def flush(self):
@@ -45,7 +45,7 @@ class Telemetry:
         return ticks > 0
 
     def serve(self, wait_ms=0):
-        """Answers new subscriptions with the state, between two blocks only; tells whether there was one."""
+        """Answers new subscriptions with the state, only between two blocks; tells whether there was one."""
         asked = False
         while self._socket.poll(wait_ms):
             request, wait_ms = self._socket.recv(), 0

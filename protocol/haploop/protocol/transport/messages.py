@@ -1,4 +1,4 @@
-"""The two tables of a run: its processes, and the messages that travel between them, each with its code and fields.
+"""The two tables of a run: its processes, and the messages between them, each with its code and fields.
 
 Every frame is a msgpack array ``[VERSION, code, field, field, ...]``; the table of messages is the whole grammar. Encoding,
 checking and the documentation in ``protocol/README.md`` derive from it.
@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 VERSION = 1
 
-# Field types: what msgpack must have unpacked. "number" is an int or a float; what ends in "?" may be nil, and at the end
-# of a frame be left out, so that a field can be added without another version.
+# Field types: what msgpack must have unpacked. "number" is an int or a float. A type that ends in "?" may be nil and, at
+# the end of a frame, may be left out, so that a field can be added without a new version.
 _TYPES: dict[str, tuple[type, ...]] = {
     "int": (int,),
     "number": (int, float),
@@ -27,12 +27,12 @@ _TYPES: dict[str, tuple[type, ...]] = {
 
 
 class Process(NamedTuple):
-    """One row of its table.
+    """One row of the table of processes.
 
     Attributes:
         role: its name in messages, logs and errors.
         binds: channel -> file name of the socket it binds, ``.sock`` in the run's directory of sockets.
-        on_loop_core: whether it ping-pongs at every tick, and so shares one core with its partner.
+        on_loop_core: whether it exchanges messages at every tick, and so shares one core with its partner.
     """
 
     role: str
@@ -55,7 +55,7 @@ OBSERVER = "observer"
 
 
 class Message(NamedTuple):
-    """One row of its table.
+    """One row of the table of messages.
 
     Attributes:
         channel: the socket it travels on (``CHANNELS``).
@@ -73,7 +73,7 @@ class Message(NamedTuple):
 CHANNELS = {
     "clock": "ROUTER bound by the clock; every node and every command line connects a DEALER",
     "loop": "ROUTER bound by the plant; the controller connects a DEALER",
-    "telemetry": "XPUB bound by plant, controller and logger, one each; whoever wants to listen connects a SUB",
+    "telemetry": "XPUB bound by plant, controller and logger, one each; every listener connects a SUB",
 }
 
 
@@ -86,9 +86,9 @@ MESSAGES: dict[str, Message] = {
     # Joining
     "JOIN": _message(1, "clock", "node", "clock", "role:text secret:text pid:int endpoints:map lossless:bool program:map?",
                      "A node asks to take part. endpoints: channel -> address of each socket it has bound. "
-                     "program: name, version and command of what joins, as far as it says them."),
+                     "program: name, version and command of what joins, as far as given."),
     "WELCOME": _message(2, "clock", "clock", "node", "run:text scene:map timebase:map endpoints:map granted:int context:map",
-                        "The node is part of the run: the resolved scene, its integers, every address, the tick granted."),
+                        "The node is part of the run: the resolved scene, its time base, every address, the tick granted."),
     "REFUSED": _message(3, "clock", "clock", "any", "reason:text", "The frame before could not be used, and why."),
     "READY": _message(4, "clock", "node", "clock", "tick:int", "All the node's connections stand; it starts from this tick."),
     # Time
@@ -97,14 +97,14 @@ MESSAGES: dict[str, Message] = {
     "PROGRESS": _message(6, "clock", "node", "clock", "tick:int status:map", "Every tick before this one is done."),
     "WAITING": _message(7, "clock", "node", "clock", "tick:int on:text", "The node is alive and waits for another."),
     # Ending
-    "ENDED": _message(8, "clock", "plant", "clock", "tick:int reason:text", "The plant ended the run by itself at this tick."),
+    "ENDED": _message(8, "clock", "plant", "clock", "tick:int reason:text", "The plant ended the run on its own at this tick."),
     "DONE": _message(9, "clock", "node", "clock", "tick:int result:map", "The node has finished and leaves."),
     "FAILED": _message(10, "clock", "node", "clock", "tick:int reason:text", "The node cannot go on, and why."),
     "ABORT": _message(11, "clock", "clock", "node", "reason:text", "The run failed elsewhere: save what there is and leave."),
-    "LEAVE": _message(12, "clock", "node", "clock", "tick:int", "An attached node goes; the run goes on."),
+    "LEAVE": _message(12, "clock", "node", "clock", "tick:int", "An attached node leaves; the run continues."),
     # Commands from people
     "COMMAND": _message(13, "clock", "client", "clock", "verb:text arguments:map", "status, options, pause, resume, step, pace, stop, swap, set, undo."),
-    "REPLY": _message(14, "clock", "clock", "client", "ok:bool text:text data:map", "What became of the command."),
+    "REPLY": _message(14, "clock", "clock", "client", "ok:bool text:text data:map", "The result of the command."),
     # The loop itself
     "HELLO": _message(20, "loop", "controller", "plant", "secret:text", "The controller presents itself; answered with HELLO."),
     "SAMPLES": _message(21, "loop", "plant", "controller", "tick:int samples:list",
@@ -130,7 +130,7 @@ BY_CODE: dict[int, str] = {message.code: name for name, message in MESSAGES.item
 
 @cache
 def required(name: str) -> int:
-    """Returns the number of fields that a message has at least: those before the last that may be nil."""
+    """Returns the least number of fields of a message: all up to the last that may not be nil."""
     fields = MESSAGES[name].fields
     return max((place for place, (_, kind) in enumerate(fields, 1) if not kind.endswith("?")), default=0)
 
