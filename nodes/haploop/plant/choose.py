@@ -1,4 +1,4 @@
-"""The choice of the motion and the position sensor that a scene asks for."""
+"""Chooses the motion and the position sensor that a scene asks for."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from haploop.protocol.ticks import Timebase
 
 
 def needs_chain(scene: Scene) -> bool:
-    """Tells whether there is more than one mass under held forces that change at the same steps of every interval.
+    """Tells whether a scene is more than one mass under held forces that change at the same steps of every interval.
 
-    All integrators but the exact transition move a chain of bodies, be it of one.
+    All integrators except the exact transition move a chain of bodies, even if it has only one.
     """
     sensor = scene.accelerometer if accelerometer_is_used(scene) else None
     return bool(
@@ -30,9 +30,9 @@ def needs_chain(scene: Scene) -> bool:
 
 
 def make_motion(scene: Scene, time: Timebase, members: int | None = None) -> Any:
-    """Makes the least motion that moves a scene, or a batch of so many members; nothing else is even imported.
+    """Makes the simplest motion that can move a scene, or a batch of ``members`` scenes; imports no other.
 
-    The integrator of a batch is exact. Raises ValueError for a hand that is unmodelled.
+    The integrator of a batch is exact. Raises ValueError for an unmodelled hand.
     """
     if hand_is_unmodelled(scene):
         raise ValueError("An unmodelled hand cannot be moved: only a plant of somebody else's runs such a scene.")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-# What is counted: the columns of the plant's telemetry, each named by its place in the summary, and what it means.
+# What is counted: the columns of the plant's telemetry, each named by its place in the summary, with its meaning.
 DROPPED, LOST = "lost.commands_dropped", "lost.commands_lost"
 SATURATED = "actuator.saturated_commands"
 CLIPPED = "accelerometer.clipped_ticks"
@@ -21,10 +21,10 @@ COUNTERS = {
 class Counter:
     """Counter of events at plant steps, noted in any order and possibly before the plant gets there.
 
-    What is counted so depends on the steps done alone, not on how far ahead commands or samples have come.
+    The count thus depends on the steps done alone, not on how far ahead commands or samples have come.
 
     Attributes:
-        state: (events before the steps told last, steps of the others).
+        state: (number of events before the end of the last column, steps of the others).
     """
 
     def __init__(self) -> None:
@@ -52,17 +52,17 @@ class Counter:
         return counts.astype(float)
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members that are not kept, shape (members,); one run has none."""
+        """Drops the members that are not kept, a mask of shape (members,); one run has none to drop."""
 
 
 class BatchCounter(Counter):
-    """Counter of the events of every member of a batch, whatever their steps; the state is of shape (members,)."""
+    """Counter of the events of every member of a batch, whatever their steps; the state has shape (members,)."""
 
     def __init__(self, members: int) -> None:
         self._count: Any = np.zeros(members, np.int64)
 
     def note(self, step: int, happened: Any = True) -> None:
-        """Counts an event of the members it happened to, shape (members,) or one truth value for all."""
+        """Counts an event for the members it happened to: a mask of shape (members,), or one truth value for all."""
         self._count = self._count + happened
 
     @property

@@ -1,4 +1,4 @@
-"""The plant as a process: samples out, commands in, telemetry beside."""
+"""The plant as a process: samples out, commands in, telemetry alongside."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class PlantNode:
         scene = Scene.from_dict(welcome["scene"])
         timebase = Timebase(**welcome["timebase"])
         self._plant = Plant(scene, timebase)
-        # Over a network a message takes its time, however few samples it holds.
+        # Over a network a message takes time, however few samples it holds.
         least_ticks = timebase.lookahead_ticks + 1 if transport_of(context).host else 1
         self._block = BlockLength(timebase.block_ticks(scene.run), machine_of(context).now, least_ticks)
         self._flushed = 0
@@ -57,7 +57,7 @@ class PlantNode:
         self._client.ready(0)
 
     def run(self) -> tuple[int, Message]:
-        """Steps until the run ends; what has been stepped is told also where it fails, here or elsewhere."""
+        """Steps until the run ends; publishes what has been stepped even if the run fails, here or elsewhere."""
         try:
             return self._run()
         except (Aborted, ArithmeticError, LoopError):
@@ -85,7 +85,7 @@ class PlantNode:
 
     def _exchange(self, tick: int, samples: list[tuple[float, ...]]) -> list[float]:
         forces = self._loop.exchange(tick, samples)
-        self._client.keep_in_touch(tick, "controller")  # where every answer takes its time, a block takes long
+        self._client.keep_in_touch(tick, "controller")  # where answers are slow, a block takes long
         return forces
 
     def _end(self) -> tuple[int, Message]:

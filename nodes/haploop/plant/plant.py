@@ -13,20 +13,20 @@ from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import DELAY, Timebase
 
-# From the first tick of at most L + 1 samples and these to the forces in N that answer them.
+# Takes the tick of the first of at most L + 1 samples, and the samples; returns the forces in N that answer them.
 Exchange = Callable[[int, list[tuple[float, ...]]], list[float]]
 
 
 class Checkpoint(NamedTuple):
-    """All that a plant goes on from, once its block has been taken.
+    """Everything from which a plant continues, once its block has been taken.
 
-    A tree of numbers, strings and arrays of NumPy, of which msgpack makes bytes with ``default=np.ndarray.tolist``.
+    A tree of numbers, strings and NumPy arrays, which msgpack packs with ``default=np.ndarray.tolist``.
 
     Attributes:
         interval_due: whether the interval before ``tick`` has yet to be stepped.
-        unusable: whether a command has come that is no finite number.
-        delays: changes of the delay to come, (first command, plant steps).
-        delay_steps: the delay that a change has brought, or None.
+        unusable: whether a command has arrived that is not a finite number.
+        delays: changes of the delay still to come, (first command, plant steps).
+        delay_steps: the delay that a change has set, or None.
         motion, line, position, accelerometer: the states of the parts.
     """
 
@@ -79,12 +79,12 @@ class Plant:
         return self._position.reading(x), sensor.reading(acceleration) if sensor else acceleration
 
     def schedule(self, tick: int, change: Event) -> None:
-        """Has a change take effect at ``tick``, if it is one of the line's delay: command ``tick`` is the first."""
+        """Schedules a change for ``tick`` if it is one of the line's delay: command ``tick`` is the first."""
         if DELAY in (values := change.get("set", {})):
             self._delays.append((tick, round(values[DELAY] * self._steps * self._control_rate)))
 
     def run_until(self, end: int, exchange: Exchange) -> None:
-        """Works up to tick ``end``, or to where the plant stops by itself; delays change on the way."""
+        """Runs up to tick ``end``, or until the plant stops by itself; changes the delay on the way."""
         while self._delays and self._delays[0][0] < end:
             tick, delay_steps = self._delays.pop(0)
             self._work_until(tick, exchange)
@@ -98,7 +98,7 @@ class Plant:
         self._counters |= self._line.counters
 
     def _work_until(self, end: int, exchange: Exchange) -> None:
-        """Works up to tick ``end`` with one delay."""
+        """Runs up to tick ``end`` with one delay."""
         most = self._most
         while (tick := self.tick) < end and self.stop_reason is None:
             samples = self.samples(min(most, end - tick))
@@ -129,7 +129,7 @@ class Plant:
 
     @property
     def has_no_force(self) -> bool:
-        """True once a command came that is no finite number."""
+        """True once a command has arrived that is not a finite number."""
         return self._unusable
 
     @property
@@ -138,7 +138,7 @@ class Plant:
         return self.tick - self._interval_due
 
     def _advance(self) -> bool:
-        """Steps through interval ``tick - 1``; False when the run has to end where the plant now is."""
+        """Steps through interval ``tick - 1``; returns False if the run has to end where the plant now is."""
         tick = self.tick - 1
         holds = self._line.holds(tick)
         if self._unusable:
@@ -160,7 +160,7 @@ class Plant:
         return {"tick": self.reached, "x": motion.x, "v": motion.v, "force": force, "command": command}
 
     def checkpoint(self) -> Checkpoint:
-        """Returns all that the plant goes on from, once its block has been taken."""
+        """Returns everything from which the plant continues, once its block has been taken."""
         return Checkpoint(
             self.tick,
             self._interval_due,
@@ -176,7 +176,7 @@ class Plant:
         )
 
     def restore(self, checkpoint: Sequence[Any]) -> None:
-        """Goes on from a checkpoint of a plant of the same scene, as taken or as unpacked; this plant is a new one."""
+        """Continues from a checkpoint of a plant of the same scene, as taken or as unpacked; this plant must be new."""
         of = Checkpoint(*checkpoint)
         if of.delay_steps is not None:
             self._retime(of.delay_steps)
@@ -191,10 +191,10 @@ class Plant:
         self._x, self._block_first = self._motion.x, self.reached
 
     def take_block(self) -> tuple[int, int, dict[str, bytes]]:
-        """Returns (first tick, ticks, columns) of what was stepped since the last block; empties it.
+        """Returns (first tick, ticks, columns) of what was stepped since the last block; clears it.
 
         Columns are little-endian float64 with ``ticks * n + 1`` rows: every step of the block and its end state, whose
-        force and command are the last held ones. What effects count follows, the number of times before a step.
+        force and command are the last held ones. The counters of effects follow: the number of events before a step.
         """
         first, reached = self._block_first, self.reached
         record = self._motion.take_record(first)
@@ -205,7 +205,7 @@ class Plant:
 
 
 def beyond(x: float, limit_m: float) -> str:
-    """Returns why a run ends with the device at x, not within ``limit_m`` of 0."""
+    """Returns the reason why a run ends with the device at x, which is not within ``limit_m`` of 0."""
     if math.isfinite(x):
         return f"the device was at {x:g} m, beyond the limit of {limit_m:g} m"
     return f"the arithmetic failed, not the device: its position came out as {x}"

@@ -1,4 +1,4 @@
-"""Random numbers of a run: one stream for each thing that is random, a function of the seed and its name alone."""
+"""Random numbers of a run: one stream for each random quantity, a function of the seed and its name alone."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from numpy.random import Generator, Philox
 # Returns the next number of a stream; in a batch, an array with a number for each member.
 Draw = Callable[[], Any]
 
-# Draws are made in pieces on a fixed grid, so that how a run is cut into messages cannot change a bit of them.
+# Draws are made in pieces on a fixed grid, so that the way a run is cut into messages cannot change a bit of them.
 PIECE = 4096
-# Rows drawn at a time in a batch; divides a piece. A generator goes on where it stopped.
+# Rows drawn at a time in a batch; a piece is a multiple of it. A generator continues where it stopped.
 _ROWS = 128
 
 
 def make_normal(seed: Any, name: str, first: int = 0) -> Draw:
-    """Returns the standard normal numbers of a named stream from draw ``first`` on; of each where there are seeds."""
+    """Returns the standard normal numbers of a named stream from draw ``first`` on; in rows if ``seed`` is an array."""
     if getattr(seed, "shape", ()):
         return NormalRows(np.asarray(seed), name, first)
     return RandomStream(int(seed), name).normal(first)
@@ -32,7 +32,7 @@ class RandomStream:
     """A named stream of a seed: draw i depends on (seed, name, i) only, so that no effect disturbs another's numbers.
 
     Counter-based: Philox 4x64 (Salmon et al. 2011) under a key made of seed and name by SHA-256; each piece of draws
-    starts at a counter of its own. A stream is meant for draws of one kind; each method starts it at draw ``first``.
+    starts at its own counter. A stream is meant for draws of one kind; each method starts it at draw ``first``.
     """
 
     seed: int
@@ -60,15 +60,15 @@ class RandomStream:
         return draws.__next__
 
     def generator(self, piece: int) -> Generator:
-        """Returns what makes the draws of a piece, from its first one on."""
+        """Returns the generator of the draws of a piece, at its first draw."""
         digest = hashlib.sha256(f"{self.seed}/{self.name}".encode()).digest()
         return Generator(Philox(key=int.from_bytes(digest[:16], "little"), counter=piece << 128))
 
 
 class NormalRows:
-    """Standard normal numbers of a named stream for every seed of a batch, a row of shape (members,) a draw.
+    """Standard normal numbers of a named stream for every seed of a batch: a row of shape (members,) per draw.
 
-    Every member draws what it would draw alone.
+    Every member draws the numbers that it would draw alone.
     """
 
     def __init__(self, seeds: np.ndarray, name: str, first: int = 0) -> None:
@@ -80,7 +80,7 @@ class NormalRows:
             self()
 
     def select(self, kept: np.ndarray) -> None:
-        """Drops the members that are not kept, shape (members,)."""
+        """Drops the members that are not kept; ``kept`` is their mask, shape (members,)."""
         self._seeds, self._rows = self._seeds[kept], self._rows[:, kept]
         self._generators = [one for one, stays in zip(self._generators, kept, strict=False) if stays]
 
@@ -100,6 +100,6 @@ class NormalRows:
 
 
 def select_draws(draw: Draw | None, kept: np.ndarray) -> None:
-    """Drops members from a stream that has numbers for each; one that all share stays as it is."""
+    """Drops members from a stream with numbers for each member; one that all share stays unchanged."""
     if isinstance(draw, NormalRows):
         draw.select(kept)

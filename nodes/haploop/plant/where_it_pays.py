@@ -1,4 +1,4 @@
-"""Loops of machine code that are loaded where they pay."""
+"""Loops of machine code that are loaded where they save time."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from typing import Any, ClassVar
 
 
 class WhereItPays:
-    """A module of loops of machine code, loaded once so much was to be done in this process: sooner it costs more.
+    """A module of machine-code loops, loaded once this process has had work enough: sooner it costs more than it saves.
 
-    The module has ``try_out()``, which raises where the loops cannot be compiled, or loaded, and ``is_made()``, which
+    The module has ``try_out()``, which raises if the loops cannot be compiled or loaded, and ``is_made()``, which
     tells whether they were compiled before.
 
     Attributes:
-        may_wait: whether this process may wait until they are compiled, 16 s, or a minute on a busy machine: not the
-            nodes of a run, which have deadlines and load what is made already; runs in one process and batches set it.
-        is_off: whether all does without: set by ``none`` alone.
-        pays: from how much on it pays.
-        asked: how much was to be done so far.
+        may_wait: whether this process may wait until they are compiled, 16 s, or a minute on a busy machine. The nodes
+            of a run may not: they have deadlines, and load what is already compiled. Runs in one process and batches
+            set it.
+        is_off: whether everything runs without such loops; set by ``none`` alone.
+        pays: the amount of work from which on loading them saves time.
+        asked: the amount of work requested so far.
     """
 
     may_wait: ClassVar[bool] = False
@@ -30,7 +31,7 @@ class WhereItPays:
     @classmethod
     @contextmanager
     def none(cls) -> Iterator[None]:
-        """Has all that is made meanwhile do without loops of machine code."""
+        """Makes everything that is created meanwhile run without machine-code loops."""
         before, cls.is_off = cls.is_off, True
         try:
             yield
@@ -42,24 +43,24 @@ class WhereItPays:
         self._name, self._loaded = module, []
 
     def module_for(self, amount: int) -> Any:
-        """Returns the module where it pays with so much more to do, and may be waited for, and works; else None."""
+        """Returns the module if it pays for so much more, is compiled or may be waited for, and works; else None."""
         self.asked += amount
         pays = self.asked >= self.pays and not self.is_off
         return self.module() if pays and (self.may_wait or self._is_made()) else None
 
     def module(self) -> Any:
-        """Returns the module, or None where it does not work."""
+        """Returns the module, or None if it does not work."""
         if not self._loaded:
             try:
                 loops = import_module(self._name)
                 loops.try_out()
-            except Exception:  # not installed, or not for this version of NumPy, or broken: NumPy does the same
+            except Exception:  # not installed, or not for this version of NumPy, or broken: NumPy computes the same
                 loops = None
             self._loaded.append(loops)
         return self._loaded[0]
 
     def _is_made(self) -> bool:
-        """Tells whether the loops are compiled already; that asks for an import of numba, 1 s, if they may be only."""
+        """Tells whether the loops are compiled already; imports numba for this, 1 s, only if they may be."""
         from haploop.protocol.machine_code import MADE
 
         spec = find_spec(self._name)
@@ -72,5 +73,5 @@ class WhereItPays:
             return False
 
     def forget(self) -> None:
-        """Has the module looked for anew when it is next asked for."""
+        """Forgets the module, so that the next request looks for it again."""
         self._loaded.clear()

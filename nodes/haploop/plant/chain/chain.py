@@ -28,14 +28,14 @@ class Chain:
 
     Coordinates: x of body 0, the stretch s_i = x_i - x_{i-1} of every link, their rates v and u_i, then, where the
     scene asks for them, the actuator's force p and the accelerometer's output y. Stretches are states, so that a
-    stiff cable's force is no difference of two large positions. Each body: m a = forces of its links + damping to
+    stiff cable's force is not a difference of two large positions. Each body: m a = forces of its links + damping to
     ground; body 0 also takes the actuator's force and friction, body N-1 the hand's force tau and k_h (rest - x).
         p' = 2 pi bandwidth (command - p)        y' = 2 pi bandwidth (a of the sensor's body - y)
 
     Attributes:
         bodies: names of the bodies.
         masses_kg: of each body.
-        grounded: damper from each body to ground, by heat's name -> (body, N s/m).
+        grounded: damper from each body to ground, by the name of its heat -> (body, N s/m).
         links: between body i and i + 1.
         spring: (stiffness N/m, rest m) from the last body to ground.
         actuator_rate: 2 pi bandwidth, 1/s, or None where the command acts at once.
@@ -81,7 +81,7 @@ class Chain:
         return cls(tuple(bodies), tuple(masses), grounded, tuple(links), spring, actuator_rate, sensor, start)
 
     def __hash__(self) -> int:
-        return hash(repr(self))  # a dict among the fields has no hash
+        return hash(repr(self))  # one of the fields is a dict, which has no hash
 
     @property
     def count(self) -> int:
@@ -99,17 +99,17 @@ class Chain:
         return *self.positions, *rates, *actuator, *(["accelerometer"] if self.sensor else [])
 
     def start_state(self, *members: int) -> np.ndarray:
-        """Returns all states at t = 0, shape (states,); of a batch of so many members (states, members)."""
+        """Returns all states at t = 0, shape (states,); for a batch of that many members, (states, members)."""
         z = np.zeros((len(self.states), *members))
         z[0], z[self.count] = self.start
         return z
 
     def absolute(self) -> Matrix:
-        """Returns T: positions (velocities) of all bodies from the relative ones, shape (N, N)."""
+        """Returns T, the matrix from relative positions (velocities) to those of all bodies, shape (N, N)."""
         return np.tril(np.ones((self.count, self.count)))
 
     def accelerations(self, stuck: bool = False) -> Matrix:
-        """Returns the acceleration of every body from (states, command, friction, load), shape (N, states + 3).
+        """Returns the matrix from (states, command, friction, load) to all accelerations, shape (N, states + 3).
 
         ``load`` is tau + k_h rest. ``stuck``: body 0 is held by friction whatever acts on it.
         """
@@ -132,9 +132,9 @@ class Chain:
         return result
 
     def rates(self, stuck: bool = False) -> Matrix:
-        """Returns the rates of the states from (states, command, friction, load), shape (states, states + 3), 1/s.
+        """Returns the matrix from (states, command, friction, load) to the rates, shape (states, states + 3), 1/s.
 
-        Stuck, v is 0 and so is its rate, and x stays.
+        While body 0 is stuck, v is 0 and so is its rate, and x stays.
         """
         n, size = self.count, len(self.states)
         accelerations = self.accelerations(stuck)
@@ -158,7 +158,7 @@ class Chain:
         return real_for(float(np.abs(self.rates()[n : 2 * n, n : 2 * n]).max()), step_s)
 
     def scales(self, step_s: float) -> np.ndarray:
-        """Returns factors that make (states, command, friction, load) velocities: lengths c, forces h/m, y h.
+        """Returns factors that make (states, command, friction, load) velocities: c of lengths, h/m of forces, h of y.
 
         c is at least 1/h and at least the fastest natural frequency (row sums bound it).
         """
@@ -176,6 +176,6 @@ class Chain:
 
 
 def sensor_body(scene: Scene) -> int:
-    """Returns the body an accelerometer is mounted on: the first without a cable, and for an ideal one."""
+    """Returns the body an accelerometer is mounted on: the first if there is no cable, or for an ideal one."""
     is_at_tip = scene.accelerometer is not None and scene.accelerometer.mount == "tip"
     return int(scene.transmission is not None and is_at_tip)

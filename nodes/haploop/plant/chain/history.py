@@ -35,9 +35,9 @@ class ChainState(NamedTuple):
 
     Attributes:
         z: all states of the chain, shape (states,).
-        z_comp: what rounding left of them (compensated addition), shape (states,).
-        held: force in N and command tick (and whatever else) held last, shape (columns,).
-        sensed: accelerations at the last plant steps that a delayed sensor has yet to tell, m/s^2, the oldest first.
+        z_comp: their compensation, the digits that rounding left over (compensated addition), shape (states,).
+        held: force in N, command tick (and anything else) held last, shape (columns,).
+        sensed: accelerations at the last plant steps that a delayed sensor has yet to report, m/s^2, the oldest first.
         mode: whether body 0 sticks or slips; None without friction.
     """
 
@@ -52,9 +52,9 @@ class Interval(NamedTuple):
     """Course of an interval; in a batch every array has one more axis, the last, for the members.
 
     Attributes:
-        course: all of what follows, side by side, shape (n + 1, columns); a row of the end has states alone.
-        states, comps: at every plant step and at the end, shape (n + 1, states); what rounding left of the states.
-        held: force and command tick (and whatever else) held over every step, shape (n, columns).
+        course: all of the following, side by side, shape (n + 1, columns); the row of the end has states alone.
+        states, comps: the states and their compensation at every plant step and at the end, shape (n + 1, states).
+        held: force, command tick (and anything else) held over every step, shape (n, columns).
         at_ends: friction in N and whether body 0 is stuck at the end of every step, shape (n, 2).
     """
 
@@ -66,15 +66,15 @@ class Interval(NamedTuple):
 
     @classmethod
     def of(cls, course: np.ndarray, states: int) -> Interval:
-        """Returns the parts of a course of so many states."""
+        """Returns the parts of a course with this number of states."""
         of_steps = course[:-1, 2 * states :]
         return cls(course, course[:, :states], course[:, states : 2 * states], of_steps[:, :-2], of_steps[:, -2:])
 
 
 class ChainHistory(ABC):
-    """State and record of a chain; what moves it is written in the classes that build on this.
+    """State and record of a chain; the classes derived from this one move it.
 
-    It is made of what ``OneMassMotion`` is made of, and has its properties and methods.
+    It is made from the arguments of ``OneMassMotion`` and has its properties and methods.
     """
 
     held_names = HELD
@@ -108,11 +108,11 @@ class ChainHistory(ABC):
 
     @property
     def last(self) -> Hold:
-        """Hold in effect last, its steps left out (0)."""
+        """The hold last in effect, with 0 for its steps."""
         return 0, first_row(self.state.held), int(self.state.held[1].flat[0])
 
     def restore(self, state: Any, _last: Any) -> None:
-        """Goes on from a state, whose arrays may be lists."""
+        """Continues from a state, whose arrays may be lists."""
         z, z_comp, held, sensed, mode = state
         arrays = np.array(z), np.array(z_comp), np.array(held)
         self.state = ChainState(*arrays, tuple(sensed), StickSlipState(*mode) if mode else None)
@@ -122,7 +122,7 @@ class ChainHistory(ABC):
         return self._tau.at_steps(first, last) + self._rest_N
 
     def _begin(self, holds: list[Hold]) -> Interval:
-        """Returns an interval of which the start is known, and what is held in it."""
+        """Returns an interval with the start, and what is held in it, filled in."""
         z, z_comp, *_ = self.state
         size, first = len(z), 0
         course = np.empty((self._n + 1, 2 * size + len(self.held_names) + 2, *z.shape[1:]))
@@ -140,7 +140,7 @@ class ChainHistory(ABC):
         """Moves through interval ``tick`` under the forces held in it; returns x at its end, m."""
 
     def _accept(self, tick: int, interval: Interval, mode: StickSlipState | None = None) -> Any:
-        """Takes the interval for what happened; returns x at its end, m."""
+        """Accepts the interval as what happened; returns x at its end, m."""
         self._done.append(interval)
         _, states, comps, held, at_ends = interval
         sensed = self._sensor.after(self.state.sensed, states, held[:, 0], at_ends, tick * self._n + 1)
@@ -148,13 +148,13 @@ class ChainHistory(ABC):
         return self.x
 
     def acceleration(self, _tick: int) -> Any:
-        """Returns what a sensor with the scene's bandwidth and delay feels at the present tick, m/s^2."""
+        """Returns the acceleration felt at the present tick by a sensor with the scene's bandwidth and delay, m/s^2."""
         return self.state.sensed[0] if self.state.sensed else 0.0
 
     def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, np.ndarray]:
-        """Returns the record as ``OneMassMotion`` does, of every state (but x with ``positions_only``).
+        """Returns the record as ``OneMassMotion`` does, of every state (of x alone with ``positions_only``).
 
-        Its columns are the states, what rounding left of each length (``*_low``), and what was held, by name.
+        Its columns are the states, the compensation of each length (``*_low``), and what was held, by name.
         """
         done, self._done = self._done, []
         chain, (z, z_comp, held, *_) = self.chain, self.state
@@ -181,8 +181,10 @@ class ChainHistory(ABC):
 
 
 def _columns(parts: list[np.ndarray], end: np.ndarray, count: int) -> Iterable[np.ndarray]:
-    """Returns the first ``count`` columns of parts of shape (rows, columns[, members]), one after the other, and of
-    their end; in a batch each contiguous."""
+    """Returns the first ``count`` columns of parts of shape (rows, columns[, members]), joined, and of their end.
+
+    In a batch each column is contiguous.
+    """
     if end.ndim == 1:
         return np.concatenate([*parts, end[None]]).T[:count]
     return (np.concatenate([*(part[:, at] for part in parts), end[at, None]]) for at in range(count))

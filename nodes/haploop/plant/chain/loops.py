@@ -1,6 +1,6 @@
-"""A loop of machine code (numba) for an interval of a chain whose bodies nothing rubs.
+"""A loop of machine code (numba) for an interval of a chain without friction.
 
-The formulas are those of ``motion.follow``; so are the bits.
+The formulas are those of ``motion.follow``, and so are the results, to the bit.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def follow(held, forced, course, ends):  # pragma: no cover
 
 @lru_cache(maxsize=1024)
 def ends_of(counts: tuple[int, ...]) -> np.ndarray:
-    """Returns the step at which each hold of so many steps ends."""
+    """Returns the step at which each hold ends, from the number of steps of each."""
     return np.cumsum(counts)
 
 
@@ -60,5 +60,5 @@ def is_made() -> bool:
 
 
 def try_out() -> None:
-    """Compiles the loop, or loads it; raises whatever numba does."""
+    """Compiles the loop, or loads it; raises whatever numba raises."""
     _code.try_out(lambda: follow(np.zeros((1, 4, 2)), np.zeros((2, 2)), np.zeros((2, 8)), ends_of((1,))))

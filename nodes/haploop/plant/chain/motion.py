@@ -13,16 +13,16 @@ from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
-# For so many intervals in all.
+# They pay from this many intervals in all.
 LOOPS = WhereItPays("haploop.plant.chain.loops", 60_000)
 
 
 class ChainMotion(ChainHistory):
     """z' = A z + B (command, friction, load): command and friction held, load = tau + k_h rest linear in a plant step.
 
-    The motion is a sum z = y + D: D, the forced response to the load from zero at the start of an interval, is made
-    beforehand; y starts as z and follows the held forces, all plant steps of a hold at once. States are floats with
-    the rounding they left over (compensated addition). Sums run over the first axis, term by term.
+    The motion is a sum z = y + D: D, the forced response to the load from zero at the start of an interval, is computed
+    beforehand; y starts equal to z and follows the held forces, all plant steps of a hold at once. States are floats,
+    each with the digits that rounding left over (compensated addition). Sums run over the first axis, term by term.
     """
 
     def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
@@ -44,7 +44,7 @@ class ChainMotion(ChainHistory):
 
 
 class LoneChainMotion(ChainMotion):
-    """``ChainMotion`` of one run, by a loop of machine code where that pays."""
+    """``ChainMotion`` of one run, by a loop of machine code where that saves time."""
 
     def __init__(self, scene: Scene, time: Timebase) -> None:
         super().__init__(scene, time)
@@ -62,12 +62,12 @@ class LoneChainMotion(ChainMotion):
 def follow(
     held: np.ndarray, forced: np.ndarray, interval: Interval, begin: int, holds: list[Hold], friction: Any
 ) -> None:
-    """Fills in the states of an interval from step ``begin`` on, where they are known.
+    """Fills in the states of an interval from step ``begin`` on, at which they are known.
 
-    Two motions under the same load differ by a motion without any: y = z - D at any step.
+    Two motions under the same load differ by a motion without load: y = z - D at any step.
 
     Args:
-        held: of ``ChainTransition``, the transition that holds.
+        held: ``held`` of the ``ChainTransition`` that applies.
         forced: D, the forced response at every step and at the end, shape (n + 1, states).
         holds: what is held in the interval.
         friction: force of friction in N, the same throughout.

@@ -1,4 +1,4 @@
-"""The acceleration that an accelerometer on a body of the chain senses: under which forces, band-limited, how late."""
+"""The acceleration that an accelerometer on a body of the chain senses: under which forces, with which bandwidth and delay."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from haploop.protocol.trees import tree_select
 
 
 class SensedAcceleration:
-    """Accelerations at plant steps, kept until a late sensor has told them.
+    """Accelerations at plant steps, kept until a delayed sensor has reported them.
 
     At a step the sensor senses the acceleration under the forces held over the step that ends there; 0 at the start,
-    and while friction holds its body. A bandwidth makes it a state of the chain; a delay reads an older step.
+    and while friction holds its body. With a bandwidth it is a state of the chain; with a delay an older step is read.
 
     Attributes:
         none: what is kept before the first step; empty where no sample carries an acceleration.

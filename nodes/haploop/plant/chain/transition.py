@@ -1,4 +1,4 @@
-"""Exact transition of a chain of bodies over plant steps, and over a plant step halved again and again."""
+"""Exact transition of a chain of bodies over plant steps, and over a plant step halved repeatedly."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ Made = TypeVar("Made")
 _wide = np.longdouble
 # Responses to the load are made for this many intervals at a time, on a fixed grid; in a batch for fewer.
 PIECE_TICKS, _PIECE_TICKS_OF_A_BATCH = 256, 8
-# Devices of which a process keeps what takes long to make, twice half a megabyte each with friction.
+# Devices for which a process keeps what takes long to make: with friction, twice half a megabyte each.
 DEVICES = 64
 
 
 def of_device(make: Callable[..., Made]) -> Callable[..., Made]:
-    """Returns ``make``, from a chain of floats and what else it needs, that keeps what it made of the last of them.
+    """Returns ``make``, a function of a chain of floats and further arguments, with a cache of its last results.
 
-    It may not look at the start and the rest: chains that differ in these alone share it.
+    It must not use the start and the rest position: chains that differ in these alone share a result.
     """
     kept = lru_cache(maxsize=2 * DEVICES)(make)  # of each device with its first body free, and held
     return lambda chain, *of: kept(_of_any_start(chain), *of)
@@ -57,7 +57,7 @@ class ChainTransition:
         self.held = np.ascontiguousarray(self._unscaled(np.stack(increments))[:, : self._size + 2].swapaxes(0, 1))
 
     def halves(self, levels: int) -> Matrix:
-        """Returns the transitions over h, h/2, ... h/2^levels; rise is of a whole step.
+        """Returns the transitions over h, h/2, ... h/2^levels; rise is that over a whole step.
 
         Shape (levels + 1, states + 4, states).
         """
@@ -95,9 +95,10 @@ def halves_of(chain: Chain, step_s: float, levels: int, stuck: bool) -> Matrix:
 
 
 class ChainResponse:
-    """Transitions, and the forced (zero-state) response to the load alone, of intervals of so many steps: a cache.
+    """Cache of the transitions of intervals, and of their forced (zero-state) response to the load alone.
 
-    ``of_piece`` returns the responses of a piece of so many intervals, each as ``of_interval`` does.
+    An interval has ``steps`` steps. ``of_piece`` returns the responses of a piece of several intervals, each as
+    ``of_interval`` does.
     """
 
     def __init__(
@@ -136,10 +137,11 @@ class ChainResponse:
 
 
 class ChainIntegrals:
-    """Exact integrals over h/2^level from the rates w = (z', rise) at its start, for the energy books.
+    """Exact integrals over h/2^level from the rates w = (z', rise) at the start, for the energy books.
 
-    Differentiating z' = A z + B u once gives w its own linear system, w' = R w: command and friction are constant and
-    load' = rise / h. In rates nothing cancels when large forces hold the bodies at rest. For a velocity r . w
+    Differentiating z' = A z + B u once gives a linear system for w itself, w' = R w: command and friction are constant
+    and load' = rise / h. In terms of rates nothing cancels when large forces hold the bodies at rest. For a velocity
+    r . w
         integral (r.w)^2 dt = w' square w            integral (t - t_mid)/t_end r.w dt = lag . w
     """
 
@@ -153,7 +155,7 @@ class ChainIntegrals:
         self._scales = scales
 
     def products(self, pairs: Sequence[tuple[np.ndarray, np.ndarray]], levels: np.ndarray) -> Matrix:
-        """Returns symmetric Q, unscaled, with integral (left.w)(right.w) dt = w' Q w over h/2^level, one of each pair.
+        """Returns symmetric Q, unscaled, with integral (left.w)(right.w) dt = w' Q w over h/2^level, one for each pair.
 
         Shape (levels, pairs, states + 1, states + 1).
         """
@@ -181,9 +183,9 @@ class ChainIntegrals:
 
 
 def devices_of(chain: Chain, members: int) -> tuple[list[int], np.ndarray]:
-    """Returns one member of each device of a batch, and which of these devices every member has, shape (members,).
+    """Returns one member for each device of a batch, and which of these devices every member has, shape (members,).
 
-    Chains that differ in the start and the rest alone are of one device.
+    Chains that differ in the start and the rest position alone belong to one device.
     """
     numbers = [leaf for leaf in tree_leaves(_of_any_start(chain)) if getattr(leaf, "shape", ())]
     rows = list(zip(*(np.broadcast_to(number, members).tolist() for number in numbers), strict=True))
@@ -199,14 +201,15 @@ def _of_any_start(chain: Chain) -> Chain:
 def make_tables(
     make: Callable[[Chain], tuple[np.ndarray, ...]], chain: Chain, *, has_members: bool = True
 ) -> tuple[np.ndarray, ...]:
-    """Makes tables of a chain; of the chains of a batch those of each, side by side.
+    """Makes the tables of a chain; for a batch, the tables of each of its chains, side by side.
 
     Args:
-        make: from a chain of floats to tables; it may not look at the start and the rest.
-        has_members: whether it is of a batch: a last axis is then for the members, of length 1 where all share it.
+        make: function from a chain of floats to tables; it must not use the start and the rest position.
+        has_members: whether the chain is that of a batch; the last axis is then for the members, of length 1 if
+            all share it.
     """
 
-    # What is made does not depend on the start and the rest: chains that differ in these alone share it.
+    # The tables do not depend on the start and the rest position: chains that differ in these alone share them.
     chain = _of_any_start(chain)
     leaves = tree_leaves(chain)
     tables = each(lambda *numbers: make(tree_unflatten(chain, numbers)), *leaves)

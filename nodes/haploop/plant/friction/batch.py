@@ -22,8 +22,8 @@ from haploop.protocol.trees import tree_map, tree_member, tree_select, tree_take
 class BatchFrictionMotion(RubbingHistory, ChainMotion):
     """``FrictionMotion`` of the members of a batch, whose numbers may all differ.
 
-    In an interval all members go as far as they would if nothing switched, those that stick and those that slip apart.
-    Most do. For each of the others the interval is solved anew by the motion of one run.
+    In an interval all members first move as if nothing switched, those that stick and those that slip separately. For
+    most, nothing does. For each of the others the interval is solved again by the motion of one run.
     """
 
     def __init__(self, scene: Scene, time: Timebase, members: int) -> None:
@@ -36,7 +36,7 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         self._loops = loops_for(self._devices, time.ticks * members)
 
     def _of_each(self, of_devices: list[StickSlip]) -> StickSlip:
-        """Returns the numbers of every member; ArithmeticError where a force has other terms in some devices."""
+        """Returns the numbers of every member; raises ArithmeticError if a force has other terms in some devices."""
 
         def of_each(*numbers: Any) -> Any:
             return numbers[0] if len(set(numbers)) == 1 else np.array(numbers)[self._device]
@@ -96,7 +96,7 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         self, mode: StickSlipState, interval: Interval, places: np.ndarray, holds: list[Hold], loads: np.ndarray,
         forced: np.ndarray,
     ) -> np.ndarray:  # fmt: skip
-        """Lets some members, of which all stick or all slip, follow their mode; returns which of them it holds for."""
+        """Moves some members, which all stick or all slip, in their mode; returns for which of them it holds."""
         some = Interval.of(np.ascontiguousarray(interval.course[..., places]), len(self.state.z))
         of, held = tree_take((self.stick_slip, (self._clamped if mode.is_stuck else self._free).held), places)
         friction = slipping(of, mode)
@@ -110,7 +110,7 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         self, interval: Interval, place: int, tick: int, holds: list[Hold], loads: np.ndarray,
         forced: tuple[np.ndarray, np.ndarray],
     ) -> StickSlipState:  # fmt: skip
-        """Takes one member through the interval alone; returns its mode at the end."""
+        """Moves one member through the interval alone; returns its mode at the end."""
         one, state = self._device_of(place), self.state
         held, mode = one.state.held, tree_member(state.mode, place)
         one.state = ChainState(state.z[:, place].copy(), state.z_comp[:, place].copy(), held, one.state.sensed, mode)
@@ -122,9 +122,9 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
         return one.state.mode
 
     def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, Any]:
-        """Returns the record as without friction, and beside it ``pieces``, member by member.
+        """Returns the record as without friction, and in addition ``pieces``, member by member.
 
-        These are (members that have any, how many each, ``pieces_record`` of all of them one after the other).
+        These are (members that have any, how many each has, ``pieces_record`` of all of them, joined).
         """
         pieces, self._pieces = self._pieces, []
         record = super().take_record(tick, positions_only=positions_only)

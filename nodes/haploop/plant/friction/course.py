@@ -1,6 +1,6 @@
 """The course of one run in which the first body of a chain sticks and slips, by a loop of machine code (numba).
 
-A call a tick is left of an interval: what the loop reads and writes stays where it is from tick to tick.
+All that is left of an interval is one call per tick: what the loop reads and writes stays in place from tick to tick.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ def _advance(
 
 
 class Course:
-    """Intervals of one run, side by side in an array that begins anew with every piece of the responses.
+    """Intervals of one run, side by side in an array; every piece of the responses begins a new array.
 
     Attributes:
-        row: of the array, at which the last interval ends; below 0 where it has to begin anew.
+        row: row of the array at which the last interval ends; below 0 if a new array has to be begun.
     """
 
     def __init__(self, of: Loops, law: Friction, steps: int) -> None:
@@ -60,7 +60,7 @@ class Course:
         self.row, self._taken = -1, 0
 
     def begin(self, state: ChainState, forced: np.ndarray, loads: np.ndarray) -> None:
-        """Begins an array; what the last one holds has been taken.
+        """Begins a new array; what the last one held has been taken.
 
         Args:
             forced: responses by interval, by whether body 0 is stuck, shape (intervals, 2, n + 1, states).
@@ -75,9 +75,9 @@ class Course:
         self.row = self._taken = 0
 
     def advance(self, at: int, first_step: int, holds: list[Hold]) -> float | None:
-        """Moves through an interval, by its place among those begun with; returns x at its end, m.
+        """Moves through the interval at place ``at`` of the piece that was begun; returns x at its end, m.
 
-        None where it switches too often for the loop: it is then to be moved by other means.
+        Returns None if it switches too often for the loop; it must then be moved by other means.
         """
         for place, hold in enumerate(holds):
             self._holds[place] = hold
@@ -88,7 +88,7 @@ class Course:
         return x
 
     def take(self) -> tuple[np.ndarray, np.ndarray]:
-        """Returns the rows since they were last taken, their end included, and the pieces; none where none are new."""
+        """Returns the rows since the last call, their end included, and the pieces; none where none are new."""
         begin, pieces, self._taken = self._taken, self._of.pieces, self.row
         count, pieces[-1, 0] = int(pieces[-1, 0]), 0.0
         return self._array[begin : self.row + 1 if self.row > begin else begin], pieces[:count].copy()
@@ -100,7 +100,7 @@ class Course:
         return ChainState(row[:size], row[size : 2 * size], before[2 * size : 2 * size + 4], sensed, mode)
 
     def interval(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns the states, the force held and what stood at the ends of the steps of the last interval."""
+        """Returns the states, the held force and ``at_ends`` of the last interval, as in ``Interval``."""
         rows, size = self._array[self.row - self._n : self.row + 1], 2 * self._size
         return rows[:, : self._size], rows[:-1, size], rows[:-1, size + 4 :]
 
@@ -111,7 +111,7 @@ def is_made() -> bool:
 
 
 def try_out() -> None:
-    """Compiles all loops, or loads them; raises whatever numba does."""
+    """Compiles all loops, or loads them; raises whatever numba raises."""
     loops.try_out()
     _code.try_out(_try_out)
 

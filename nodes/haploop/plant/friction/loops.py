@@ -1,6 +1,6 @@
 """Loops of machine code (numba) for intervals in which the first body of a chain sticks and slips, alone or in a batch.
 
-The formulas are those of ``stick_slip`` and ``substeps`` as they stand; so are the bits.
+The formulas are those of ``stick_slip`` and ``substeps``, unchanged, and so are the results, to the bit.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from haploop.protocol.machine_code import MachineCode
 
 _code = MachineCode(__file__, (motion, step_loop, stick_slip, substeps))
 _lost_in = _code.compiled(motion.lost_in, inlined=True)
-# Pieces that are kept before they are handed over.
+# This many pieces are kept before they are handed over.
 _PIECES = 16_384
-# Members taken out of a batch at a time: what lies side by side in memory is then read and written together.
+# Members taken out of a batch at a time, so that what lies side by side in memory is read and written together.
 _TOGETHER = 8
 # (member of each piece, rows of ``pieces_record``).
 Pieces = tuple[np.ndarray, np.ndarray]
@@ -128,7 +128,7 @@ def _advance(
     whole, mass_kg, speed_up, rows, tables, held, devices, laws, free, clamped, loads, ends, first_step, courses, modes,
     pieces, upto, member,
 ):  # pragma: no cover  # fmt: skip
-    """Moves members through an interval, from one on; returns the first one whose pieces there is no room for."""
+    """Moves members through an interval, from ``member`` on; returns the first for whose pieces there is no room."""
     members, n, size = courses.shape[2], courses.shape[0] - 1, free.shape[1]
     halving, room = substeps.Halving(whole[1], whole[2]), np.empty((5, ACTS))
     some, load = np.empty((_TOGETHER, n + 1, 2 * size + 6)), np.empty((_TOGETHER, n + 1))
@@ -183,20 +183,20 @@ def _advance(
 
 
 class Loops:
-    """Intervals of chains of some devices, as many states each; the law of friction is handed in.
+    """Intervals of chains of several devices with equally many states; the law of friction is passed in.
 
     Args:
-        of: of each device.
-        halving, whole_steps: how plant steps are cut, and whether one in which nothing switches is not.
+        of: sticking and slipping of each device.
+        halving, whole_steps: how plant steps are cut, and whether one in which nothing switches is left whole.
         tables: transitions over h / 2^level by device, by whether body 0 is stuck and by level, shape (devices, 2,
             levels, states + 4, states).
         held: over 1 ... n steps by device and whether it is stuck, shape (devices, 2, states + 2, n, states).
 
     Attributes:
-        cut: as the loops need it, with the place of the velocity of body 0 among the states.
-        devices: what the loops need of each; arrays, devices first.
-        states: their number.
-        pieces, room: for pieces, whose number stands in a last row, and for states on the way.
+        cut: how plant steps are cut, as the loops need it, with the place of the velocity of body 0 among the states.
+        devices: what the loops need of each; arrays with the devices on the first axis.
+        states: the number of states.
+        pieces, room: arrays for pieces, with their number in a last row, and for intermediate states.
     """
 
     def __init__(
@@ -224,7 +224,7 @@ class Loops:
         self, course: np.ndarray, forced: tuple[np.ndarray, np.ndarray], loads: np.ndarray, holds: list[Hold],
         first_step: int, modes: np.ndarray, laws: np.ndarray, devices: np.ndarray,
     ) -> list[Pieces] | None:  # fmt: skip
-        """Moves all members through an interval, whose first plant step is numbered; changes their modes in place.
+        """Moves all members through the interval that begins at step ``first_step``; changes their modes in place.
 
         Args:
             course: of an ``Interval``, shape (n + 1, columns, members); all but the start and what the line holds is
@@ -233,11 +233,11 @@ class Loops:
             loads: shape (n + 1, 1 or members), N.
             modes: whether body 0 sticks, and its direction, shape (2, members).
             laws: the numbers of ``Friction``, shape (4, 1 or members).
-            devices: the place of each member's among the devices, shape (members,).
+            devices: the place of each member's device among the devices, shape (members,).
 
         Returns:
-            Their pieces, member after member; None where one switches too often for the loops: the interval is then to
-            be moved by other means.
+            Their pieces, member after member; None if one switches too often for the loops: the interval must then be
+            moved by other means.
         """
         ends = ends_of(tuple([hold[0] for hold in holds]))
         found, pieces, begun, members = list[Pieces](), self.pieces, 0, course.shape[2]
@@ -263,12 +263,12 @@ def is_made() -> bool:
 
 
 def try_out() -> None:
-    """Compiles the loops, or loads them; raises whatever numba does."""
+    """Compiles the loops, or loads them; raises whatever numba raises."""
     _code.try_out(_try_out)
 
 
 def smallest() -> Loops:
-    """Returns the loops of a chain of one body with one plant step a tick, that does not move."""
+    """Returns the loops of a chain of one body that does not move, with one plant step per tick."""
     row = Row([], 1.0, 1.0)
     of = StickSlip(stick_slip.Friction(1.0, 1.0, 0.0, 1.0), 1, 1.0, 1.0, row, row)
     return Loops([of], substeps.Halving(0, 1), True, np.zeros((1, 2, 3, 6, 2)), np.zeros((1, 2, 4, 1, 2)))

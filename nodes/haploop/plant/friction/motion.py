@@ -34,19 +34,19 @@ if TYPE_CHECKING:
     from haploop.plant.friction.loops import Loops
 
 
-# For so many intervals in all.
+# They pay from this many intervals in all.
 LOOPS = WhereItPays("haploop.plant.friction.course", 20_000)
 
 
 class FrictionMotion(RubbingHistory, ChainMotion):
-    """Exact transition between the instants at which friction switches, and these instants by halving the step.
+    """Exact transition between the instants at which friction switches; halving the step finds these instants.
 
     Body 0 slips in a direction +-1 under friction -direction F, or is stuck: then it is clamped, v is exactly 0.0 and
-    x stays, while the rest of the chain follows the clamped system. It slips until v changes its sign; there it sticks
-    if the other forces on it are within the breakaway force, else it slips where they pull; where it ``creeps``, it
-    sticks, too. It is stuck until they exceed the breakaway force. An interval in which nothing switches is one linear
-    motion, as without friction; any other, and every one of a scene too stiff or with too curved a law for that, is
-    solved step by step.
+    x stays, while the rest of the chain follows the clamped system. It slips until v changes sign; there it sticks if
+    the other forces on it are within the breakaway force, or else slips in the direction of their pull; where it
+    ``creeps``, it sticks, too. It is stuck until these forces exceed the breakaway force. An interval in which nothing
+    switches is one linear motion, as without friction. Any other interval is solved step by step, and so is every
+    interval of a scene that is too stiff, or has too curved a law of friction, for that.
     """
 
     _course: Course | None = None
@@ -64,7 +64,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
 
     @property
     def state(self) -> ChainState:
-        """The state at the end of the last interval; one that is set is gone on from."""
+        """The state at the end of the last interval; the motion continues from one that is set."""
         if self._is_behind and self._course:
             self._state, self._is_behind = self._course.end(self._sensed), False
         return self._state
@@ -77,7 +77,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
             self._course.row = -1
 
     def _hand_over(self) -> None:
-        """Puts what is new in the course into the record."""
+        """Moves what is new in the course into the record."""
         if self._course:
             rows, pieces = self._course.take()
             if len(rows):
@@ -89,7 +89,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         return self._sensed[0] if self._sensed else 0.0
 
     def rub_by(self, law: Friction) -> None:
-        """Goes on by another law: that of one member of a batch, for what is asked of it next."""
+        """Changes the law of friction to that of one member of a batch, for the calls that follow."""
         self.stick_slip = self.stick_slip._replace(law=law)
 
     def tables(self) -> tuple[np.ndarray, np.ndarray]:
@@ -106,7 +106,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
     def advance_under(
         self, loads: np.ndarray, forced: tuple[np.ndarray, np.ndarray], tick: int, holds: list[Hold]
     ) -> Any:
-        """Moves through an interval by NumPy, under given loads, shape (n + 1,), and their responses."""
+        """Moves through an interval with NumPy, under given loads, shape (n + 1,), and their responses."""
         interval, mode = self._begin(holds), self.state.mode
         step = 0
         assert mode
@@ -128,7 +128,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
             forced = np.stack([self._free.of_piece(piece), self._clamped.of_piece(piece)], axis=1)
             course.begin(self.state, forced, self.loads(first, first + PIECE_TICKS * self._n + 1))
         x = course.advance(at, tick * self._n, holds)
-        if x is None:  # perhaps the pieces of others took all the room
+        if x is None:  # perhaps the pieces of other intervals took all the room
             self._hand_over()
             if (x := course.advance(at, tick * self._n, holds)) is None:
                 return None
@@ -165,7 +165,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         return mode
 
     def take_record(self, tick: int, *, positions_only: bool = False) -> dict[str, np.ndarray]:
-        """Returns the record as without friction, and beside it the pieces of steps that were cut."""
+        """Returns the record as without friction, and in addition the pieces of steps that were cut."""
         self._hand_over()
         pieces = pieces_record(self.chain, self.take_pieces())
         return super().take_record(tick, positions_only=positions_only) | pieces
@@ -176,7 +176,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
         return pieces
 
     def take_interval(self) -> Interval:
-        """Returns the last interval, which is then in no record."""
+        """Returns the last interval and removes it from the record."""
         return self._done.pop()
 
     def forget_record(self) -> None:
@@ -188,7 +188,7 @@ class FrictionMotion(RubbingHistory, ChainMotion):
 def holds_in_steps(
     of: StickSlip, mode: StickSlipState, interval: Interval, begin: int, friction: Any, loads: np.ndarray
 ) -> np.ndarray:
-    """Tells whether a mode holds throughout each step from ``begin`` on; in a batch on the last axis."""
+    """Tells whether a mode holds throughout each step from ``begin`` on; in a batch, along the last axis."""
     states, command = interval.states.swapaxes(0, 1), interval.held[begin:, 0]
     starts, ends, load, end_load = states[:, begin:-1], states[:, begin + 1 :], loads[begin:-1], loads[begin + 1 :]
     holds = holds_through(of, mode, ends, command, end_load)
@@ -200,7 +200,7 @@ def holds_in_steps(
 
 
 def loops_for(devices: Sequence[FrictionMotion], intervals: int) -> Loops | None:
-    """Returns loops of machine code that move chains of some devices, where they pay for so many intervals."""
+    """Returns machine-code loops for chains of these devices if they pay for so many intervals; else None."""
     if not (module := LOOPS.module_for(intervals)):
         return None
     one, (tables, held) = devices[0], map(np.stack, zip(*(device.tables() for device in devices), strict=True))

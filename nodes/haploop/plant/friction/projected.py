@@ -1,4 +1,4 @@
-"""The motion of many chains under dry friction that is projected: one formula for all members, whatever they do."""
+"""The motion of many chains under projected dry friction: one formula for all members, whatever they do."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
-# For so many ticks of members in all, half a second of them by NumPy.
+# They pay from this many ticks of members in all, which take NumPy half a second.
 LOOPS = WhereItPays("haploop.plant.friction.projected_loops", 200_000)
 
 
 class ProjectedFrictionMotion(ChainMotion):
     """Exact transition over every plant step under friction f = -clip(v_free / g, -F(v), F(v)), held over the step.
 
-    v_free is the velocity of body 0 at the end of the step without friction, g what a unit of friction does to it.
-    Where f is enough v is 0.0 exactly, and a body that was at rest keeps its place to the bit. Stops and starts fall on
-    plant steps, an error of order h in their times; in return members may differ in every number, bodies and friction
-    included, and one that chatters costs no more than one at rest. Made for searches, where ``BatchFrictionMotion``
-    solves every stop exactly, member by member. It keeps no record.
+    v_free is the velocity of body 0 at the end of the step without friction, g what a unit of friction adds to it.
+    Where f is enough, v is exactly 0.0, and a body that was at rest keeps its place to the bit. Stops and starts fall
+    on plant steps, an error of order h in their times. In return members may differ in every number, those of bodies
+    and friction included, and one that chatters costs no more than one at rest. The motion is made for searches and
+    keeps no record; ``BatchFrictionMotion`` instead solves every stop exactly, member by member.
 
     Args:
         scene: the stacked scene of the members.
-        kinetic, breakaway, stribeck: F(v) of each member, as of ``Friction``: N, N, m/s, shape (members,); infinite
-            where F is the same at every speed.
+        kinetic, breakaway, stribeck: F(v) of each member, as in ``Friction``: N, N, m/s, shape (members,); a Stribeck
+            velocity is infinite where F is the same at every speed.
     """
 
     def __init__(

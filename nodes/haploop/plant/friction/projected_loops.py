@@ -1,4 +1,4 @@
-"""A loop of machine code (numba) for plant steps of many chains under projected friction, to the bits of NumPy."""
+"""A loop of machine code (numba) for plant steps of many chains under projected friction, with the bits of NumPy."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from haploop.protocol.machine_code import MachineCode
 
 _code = MachineCode(__file__, ())
-# Members that are moved through all steps before the next: what they need then stays in the cache.
+# Members that are moved through all steps before the next ones, so that what they need stays in the cache.
 _BLOCK = 64
 
 
@@ -16,13 +16,13 @@ def move(moves, of_friction, most, v, loads, held, states, at_ends):  # pragma: 
     """Fills in states, and friction in N and whether body 0 stops, at the end of every step.
 
     Args:
-        moves: what (states, command, load, its rise) add to the states in a step, (states + 3, states, members).
+        moves: what (states, command, load, the load's rise) add to the states in a step, (states + 3, states, members).
         of_friction: what a newton of friction adds, (states, members).
-        most: of friction, N, (members,).
-        v: the state that is the velocity of body 0.
+        most: the largest friction, N, (members,).
+        v: place of the velocity of body 0 among the states.
         loads: on the last body at every step and the end, N, (n + 1, members or 1).
         held: command held over every step, N, (n, members).
-        states: at every step and at the end, of which the first row is known, (n + 1, states, members).
+        states: at every step and at the end; the first row is known, (n + 1, states, members).
         at_ends: (n, 2, members).
     """
     size, members = states.shape[1:]
@@ -73,7 +73,7 @@ def is_made() -> bool:
 
 
 def try_out() -> None:
-    """Compiles the loop, or loads it; raises whatever numba does."""
+    """Compiles the loop, or loads it; raises whatever numba raises."""
     _code.try_out(_try_out)
 
 

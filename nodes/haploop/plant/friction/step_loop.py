@@ -1,7 +1,7 @@
 """One plant step in which the first body of a chain sticks and slips, as machine code (numba).
 
-The formulas are those of ``stick_slip`` and ``substeps`` as they stand; so are the bits. What they ask of arrays is
-written here as loops, and all of it goes into the place where it is called: handing over would take longer.
+The formulas are those of ``stick_slip`` and ``substeps``, unchanged, and so are the results, to the bit. Their array
+operations are written here as loops, and all of it is inlined where it is called: passing arguments would take longer.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from haploop.protocol.machine_code import MachineCode
 
 _code = MachineCode(__file__, (stick_slip, substeps))
 _inlined = partial(_code.compiled, inlined=True)
-# No chain has more states; what acts on them are these, and four more.
+# No chain has more states; what acts on them are the states themselves and four inputs.
 STATES, ACTS = 8, 12
 NONE = (0.0,) * STATES
 
 
-# Tables are twofold: with the states that are moved side by side, filled up to ``STATES``, for all of them at once, and
-# with what acts side by side, for one.
+# Tables come in two layouts: with the moved states side by side, padded to ``STATES``, to move all of them at once; and
+# with what acts side by side, to move one of them.
 
 
 @_inlined
@@ -95,7 +95,7 @@ def _read(values, z):  # pragma: no cover
     pass
 
 
-# Pieces are rows of ``substeps.pieces_record``; how many there are, or were to be, stands in a last row.
+# Pieces are rows of ``substeps.pieces_record``; a last row has their number, which counts those without room, too.
 
 
 @_inlined

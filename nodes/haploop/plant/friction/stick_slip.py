@@ -13,14 +13,14 @@ from haploop.protocol.scene import effects
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
-# Sticking ends beyond the breakaway force by this much, relative: what rounding does to a sum of forces is far less.
+# Sticking ends this much (relative) beyond the breakaway force: rounding changes a sum of forces by far less.
 _MARGIN = 1e-12
 
 
 class Friction(NamedTuple):
     """F(v) = kinetic + (breakaway - kinetic) exp(-(v / v_s)^2) against the motion; at rest up to ``breakaway``.
 
-    Without a Stribeck velocity F is ``kinetic`` at every speed; without a breakaway force that is ``kinetic``, too
+    Without a Stribeck velocity F is ``kinetic`` at every speed; without a breakaway force, that one is ``kinetic``, too
     (Armstrong-Helouvry, Dupont and Canudas de Wit 1994).
 
     Attributes:
@@ -46,8 +46,8 @@ class Friction(NamedTuple):
         return not self.stribeck_m_s
 
 
-# The functions below are those of one run in plain numbers, of many at once in arrays, and, as they stand, of the loops
-# of machine code.
+# The functions below serve one run with plain numbers, many runs at once with arrays and, unchanged, the loops of
+# machine code.
 
 
 def friction_at(law: Friction, v: float) -> float:
@@ -64,7 +64,7 @@ def holds_against(law: Friction, force: Any) -> Any:
 
 
 class Row(NamedTuple):
-    """A linear form of (states, command, load), without its zeros: (which state, factor) of each that counts."""
+    """A linear form of (states, command, load), without its zeros: (which state, factor) of each nonzero term."""
 
     of_states: Any
     of_command: float
@@ -86,20 +86,21 @@ def row_on(row: Row, z: Any, command: Any, load: Any) -> Any:
 
 
 class StickSlip(NamedTuple):
-    """Stuck, while friction holds the other forces on body 0; slipping in a direction, until v changes its sign.
+    """Body 0, stuck while friction holds the other forces on it, or slipping in a direction until v changes sign.
 
-    Between two states of a smooth motion the mode is watched by its margin g >= 0: the speed in its direction, or what
-    friction could hold beyond the forces. g < 0 at the end means it has ceased. It may have ceased and be back where g
-    falls at the start and rises at the end: its least value is not below where the tangents at both ends meet.
-    States are arrays of shape (states,), or (states, many) with the other arguments to match; forces are in N.
+    Between two states of a smooth motion the mode is watched by its margin g >= 0: the speed in its direction, or the
+    force that friction could still hold. g < 0 at the end means that the mode has ceased. It may have ceased and
+    returned where g falls at the start and rises at the end; the least value of g is then not below the point where
+    the tangents at both ends meet. States are arrays of shape (states,), or (states, many) with the other arguments to
+    match; forces are in N.
 
     Attributes:
         law: of friction.
         v: the number of bodies, and the place of the velocity of body 0 among the states.
         mass_kg: of body 0.
-        speed_up: change of its speed by 1 N over a plant step, m/s.
-        force: the other forces on it.
-        change: by how much the states alone change these in a plant step while it sticks, N.
+        speed_up: change of its speed caused by 1 N over a plant step, m/s.
+        force: the sum of the other forces on it.
+        change: by how much the states alone change that sum in a plant step while body 0 sticks, N.
     """
 
     law: Friction
@@ -118,7 +119,7 @@ class StickSlip(NamedTuple):
 
 
 def decide_at_rest(of: StickSlip, mode: StickSlipState, z: Any, command: float, load: float) -> StickSlipState:
-    """Returns the mode from a state on: where v is exactly 0, sticking, or slipping where the other forces pull."""
+    """Returns the mode from a state on: if v is exactly 0, sticking, or slipping the way the other forces pull."""
     if z[of.v] != 0.0:
         return mode
     force = row_on(of.force, z, command, load)
@@ -131,12 +132,12 @@ def slipping(of: StickSlip, mode: StickSlipState) -> Any:
 
 
 def slipping_at(of: StickSlip, mode: StickSlipState, v: float) -> float:
-    """Returns the friction force at velocity v, N; none at rest."""
+    """Returns the friction force at velocity v, N; 0 at rest."""
     return -mode.direction * friction_at(of.law, v) if v else 0.0
 
 
 def holds_through(of: StickSlip, mode: StickSlipState, z: Any, command: Any, load: Any) -> Any:
-    """Tells whether the mode still holds in state z; all of many stick or all slip."""
+    """Tells whether the mode still holds in state z; of many states all stick or all slip."""
     if mode.is_stuck:
         return holds_against(of.law, row_on(of.force, z, command, load))
     return mode.direction * z[of.v] > 0.0
@@ -145,9 +146,9 @@ def holds_through(of: StickSlip, mode: StickSlipState, z: Any, command: Any, loa
 def creeps(of: StickSlip, mode: StickSlipState, v: Any) -> Any:
     """Tells whether body 0 slips so slowly that the margin of the breakaway force would stop it within a plant step.
 
-    That is at rest, wherever friction holds the other forces as well. A device on a damped hand whose friction is the
-    same at every speed comes to rest like this: it creeps, v = c exp(-t / T), and never reaches 0. Its v would end as
-    the rounding of what moves it, and change its sign with that.
+    That counts as rest, wherever friction holds the other forces as well. A device on a damped hand whose friction is
+    the same at every speed comes to rest like this: it creeps, v = c exp(-t / T), and never reaches 0. In the end its v
+    would be the rounding of what moves it, and would change sign with that.
     """
     return (not mode.is_stuck) & (abs(v) < _MARGIN * of.speed_up * of.law.holds_N)
 
@@ -156,9 +157,9 @@ def may_switch_within(
     of: StickSlip, mode: StickSlipState, begin: Any, end: Any, command: Any, load: Any, end_load: Any, friction: Any,
     part: float,
 ) -> Any:  # fmt: skip
-    """Tells whether the mode may cease and be back between two states in which it holds.
+    """Tells whether the mode may cease and return between two states in which it holds.
 
-    They are ``part`` of a plant step apart, with command and friction force held; all of many stick or all slip.
+    They are ``part`` of a plant step apart, with command and friction force held; of many states all stick or all slip.
     """
     force, end_force = row_on(of.force, begin, command, load), row_on(of.force, end, command, end_load)
     if not mode.is_stuck:
@@ -180,7 +181,7 @@ def tangents_meet_below(g: Any, slope: Any, end_g: Any, end_slope: Any) -> Any:
 
 
 class RubbingHistory(ChainHistory):
-    """State and record of a chain whose first body sticks and slips; goes before the motion without friction."""
+    """State and record of a chain whose first body sticks and slips; a base before the motion without friction."""
 
     held_names = (*HELD, "friction", "stuck")
 

@@ -25,16 +25,16 @@ from haploop.protocol.scene.scene import Scene
 
 # A piece is halved this often to find when friction switches: to 2e-14 s at 10 kHz.
 _HALVINGS = 32
-# No piece is longer than this part of a radian of the fastest mode, so that no reversal hides between its ends.
+# No piece is longer than this fraction of a radian of the fastest mode, so that no reversal hides between its ends.
 _RADIANS = 0.5
-# Five times what the stiffest chain takes that a scene may have; half a second.
+# Five times what the stiffest chain that a scene may have takes; half a second of work.
 _MOST_PIECES = 40_000
-# More parts of a plant step than this are no way to simulate: the plant rate is too low.
+# If a plant step has to be cut into more parts than this, the plant rate is too low to simulate.
 MOST_PARTS = 4096
 
 
 class Halving(NamedTuple):
-    """What a plant step is cut by: no piece lasts longer than h / 2^coarsest, or shorter than h / 2^finest."""
+    """How a plant step is cut: no piece lasts longer than h / 2^coarsest, or shorter than h / 2^finest."""
 
     coarsest: int
     finest: int
@@ -53,8 +53,8 @@ class Step(NamedTuple):
     is_stuck: bool
 
 
-# What follows is computed as it stands, or by machine code, where these few functions are loops over arrays. A place
-# among the tables is (whether body 0 is stuck, level); states come with what rounding left of them.
+# What follows is computed as it is, or by machine code, in which these few functions are loops over arrays. A place
+# among the tables is (whether body 0 is stuck, level); states come with their compensation.
 
 Pieces = list[list[float]]
 Place = tuple[int, int]
@@ -65,7 +65,7 @@ def moved(
     tables: Any, of: Place, z: list[float], z_comp: list[float], command: float, friction: float, load: float,
     rise: float, after: np.ndarray, comp: np.ndarray,
 ) -> None:  # fmt: skip
-    """Fills in states by a transition."""
+    """Fills in the states after a transition, and their compensation."""
     table = tables[of[0]][of[1]]
     change = np.add.reduce(table * np.array((*z, command, friction, load, rise))[:, None])
     change += z_comp
@@ -100,7 +100,7 @@ def take_over(z: np.ndarray, z_comp: np.ndarray, next_z: np.ndarray, next_comp: 
 
 
 def read(values: list[float], z: np.ndarray) -> None:
-    """Reads the numbers of an array anew."""
+    """Reads the numbers of an array into a list."""
     values[:] = z.tolist()
 
 
@@ -109,7 +109,7 @@ def count_of(pieces: Pieces) -> int:
 
 
 def note(pieces: Pieces, of: StickSlip, head: tuple[float, ...], begin: list[float], comp: list[float]) -> None:
-    """Notes a piece: a row of ``pieces_record``."""
+    """Records a piece: a row of ``pieces_record``."""
     pieces.append([*head, *begin, *comp[: of.v]])
 
 
@@ -118,7 +118,7 @@ def drop_last(pieces: Pieces) -> None:
 
 
 def is_full(pieces: Pieces, first: int, step: int) -> bool:
-    """Tells whether no further piece can be noted; raises ArithmeticError for too many in a step."""
+    """Tells whether no further piece can be recorded; raises ArithmeticError for too many in a step."""
     if len(pieces) - first > _MOST_PIECES:
         raise ArithmeticError(
             f"Friction switched so often in plant step {step} that it took {_MOST_PIECES} pieces. Raise "
@@ -136,20 +136,21 @@ def solve_step(
 
     A piece of the step is moved by the exact transition. If the mode no longer holds at its end, or may have ceased
     within it, the piece is halved, until the switch lies within h / 2^32; there the mode changes, and v is set to
-    exactly 0.0. The kinetic energy which that throws away, of the order of 1e-20 of what moves, is heat of friction.
-    A hunt for a switch ends with one: where the pieces say at its end that the mode still holds, and the one long piece
-    said that it does not, they differ by rounding, and v, or what friction could hold beyond the forces, is no more
-    than that. (With a Stribeck velocity long pieces err by more: a slip then goes on.) A slip that ``creeps`` stops,
-    too, where friction holds the other forces.
-    With a Stribeck velocity every piece has the friction of the speed foreseen for its middle: second order in h.
-    Whether the mode holds at the end of a piece few states tell, so that only a piece that is kept is moved as a whole.
+    exactly 0.0. The kinetic energy that this removes, of the order of 1e-20 of what moves, is heat of friction.
+    A search for a switch ends with one: if at its end the pieces say that the mode still holds, and the one long piece
+    said that it does not, they differ by rounding, and v, or the force that friction could still hold, is no more than
+    that. (With a Stribeck velocity long pieces have larger errors: a slip then continues.) A slip that ``creeps``
+    stops, too, where friction holds the other forces.
+    With a Stribeck velocity every piece has the friction of the speed predicted for its middle: second order in h.
+    A few states tell whether the mode holds at the end of a piece, so that only a piece that is kept is moved as a
+    whole.
 
     Args:
         tables: transitions over h / 2^level by whether body 0 is stuck and by level.
-        z, z_comp: states, and what rounding left of them, from the start of the step to its end.
+        z, z_comp: states and their compensation at the start of the step, taken to its end in place.
         rise: of the load over the step, N.
-        pieces: takes the pieces of the step, none where it is one piece.
-        next_z, next_comp: room for states on the way.
+        pieces: receives the pieces of the step; none if it is one piece.
+        next_z, next_comp: room for intermediate states.
 
     Raises:
         ArithmeticError: friction switched so often that it took 40 000 pieces.
@@ -201,7 +202,7 @@ def solve_step(
                 level += 1
         if is_full(pieces, first, step):
             break
-    if not left and count_of(pieces) == first + 1:  # one that was broken off for want of room is not done
+    if not left and count_of(pieces) == first + 1:  # one that was broken off for lack of room is not done
         drop_last(pieces)
     return Step(mode, begun_with, was_stuck)
 
@@ -224,7 +225,7 @@ def holds_after(
     of: StickSlip, mode: StickSlipState, tables: Any, piece: Place, z: Any, z_comp: Any, command: float,
     friction: float, load: float, rise: float, end_load: float,
 ) -> bool:  # fmt: skip
-    """Tells whether the mode still holds at the end of a piece, or v is no finite number, as ``holds_through``.
+    """Tells whether the mode still holds at the end of a piece, as ``holds_through``, or v is not a finite number.
 
     Where friction is 0 there is nothing to switch.
     """
@@ -238,7 +239,7 @@ def holds_after(
 
 
 def at_rest(of: StickSlip, z: np.ndarray, z_comp: np.ndarray) -> float:
-    """Puts body 0 at rest and leaves all others as they move; returns the energy in J that it lost."""
+    """Puts body 0 at rest and leaves the motion of all others unchanged; returns the energy in J that it lost."""
     v = float(z[of.v])
     if of.v > 1:
         z[of.v + 1] += v
@@ -249,8 +250,8 @@ def at_rest(of: StickSlip, z: np.ndarray, z_comp: np.ndarray) -> float:
 def pieces_record(chain: Chain, pieces: list[Any]) -> dict[str, np.ndarray]:
     """Returns the pieces of steps that were cut, given row by row or in tables, as ``pieces.<name>``, in order.
 
-    step, level (a piece lasts h / 2^level), stuck, friction and load at its start (N), snap_J (what setting v to 0
-    threw away at its end), every state at its start, and what rounding left of each length.
+    The names are step, level (a piece lasts h / 2^level), stuck, friction and load at its start (N), snap_J (the energy
+    that setting v to 0 removed at its end), every state at its start, and the compensation of each length.
     """
     names = ["step", "level", "stuck", "friction", "load", "snap_J", *chain.states]
     names += [f"{name}_low" for name in chain.positions]
@@ -273,7 +274,7 @@ def goes_by_whole_steps(scene: Scene) -> bool:
 
 @of_device
 def parts_of_a_step(chain: Chain, step_s: float) -> int:
-    """Returns into how many pieces, a power of two, a plant step is cut so that none is longer than half a radian."""
+    """Returns the number of pieces, a power of two, of a plant step cut so that none is longer than half a radian."""
     rates = [chain.rates(stuck)[:, : len(chain.states)].astype(float) for stuck in (False, True)]
     fastest = max(float(np.abs(np.linalg.eigvals(matrix).imag).max()) for matrix in rates)
     return 1 << max(0, math.ceil(math.log2(max(fastest * step_s / _RADIANS, 1.0))))

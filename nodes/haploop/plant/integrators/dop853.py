@@ -15,16 +15,16 @@ from haploop.protocol.ticks import Timebase
 
 Rates = Callable[[float, np.ndarray], np.ndarray]
 Event = Callable[[float, np.ndarray], float]
-# Relative tolerance of a step, and the speed that is none to it, m/s.
+# Relative tolerance of a step, and the speed that counts as rest for it, m/s.
 _TOLERANCE, _STILL_M_S = 1e-10, 1e-3
 
 
 class Dop853Motion(ChainHistory):
     """z' = A z + B (command, friction, load) by an explicit Runge-Kutta method of order 8 with steps of its own choice.
 
-    Of Dormand and Prince, at a relative tolerance of 1e-10 a step (Hairer, Norsett and Wanner 1993, II.10). It starts
-    anew where a force or its slope changes; plant steps are read off its dense output. The error is that of the
-    tolerance, whatever ``clock.plant_rate``. Digits below the rounding of a float are not kept.
+    The method is that of Dormand and Prince, at a relative tolerance of 1e-10 a step (Hairer, Norsett and Wanner 1993,
+    II.10). It restarts where a force or its slope changes; plant steps are read off its dense output. The error is that
+    of the tolerance, whatever ``clock.plant_rate``. Digits below the rounding of a float are not kept.
     """
 
     _mode: Any = None  # of friction
@@ -46,7 +46,7 @@ class Dop853Motion(ChainHistory):
         return self._accept(tick, interval, self._mode)
 
     def _through(self, interval: Interval, first: int, last: int, load: float, slope: float) -> None:
-        """Goes through steps ``first`` ... ``last`` under one command, the load (N) rising by ``slope`` N/s."""
+        """Moves through steps ``first`` ... ``last`` under one command, while the load (N) rises by ``slope`` N/s."""
         rates = self._free.under(float(interval.held[first, 0]), load, slope, first * self._step_s)
         ends = np.arange(first + 1, last + 1) * self._step_s
         found = self._solved(rates, (first * self._step_s, ends[-1]), interval.states[first], ends)
@@ -55,9 +55,9 @@ class Dop853Motion(ChainHistory):
     def _solved(
         self, rates: Rates, span: tuple[float, float], z: np.ndarray, ends: np.ndarray, events: Sequence[Event] = ()
     ) -> Any:
-        """Returns the motion over a span of time in s; states at ``ends``.
+        """Returns the motion over a span of time in s, with the states at ``ends``.
 
-        Raises ArithmeticError where the steps became too small to go on.
+        Raises ArithmeticError if the steps become too small to continue.
         """
         from scipy.integrate import solve_ivp  # half a second to import
 
@@ -70,7 +70,7 @@ class Dop853Motion(ChainHistory):
 
 
 class System:
-    """The rates of a chain as ``solve_ivp`` asks for them."""
+    """The rates of a chain in the form that ``solve_ivp`` asks for."""
 
     def __init__(self, chain: Chain, stuck: bool) -> None:
         size, rates = len(chain.states), chain.rates(stuck).astype(float)
@@ -78,7 +78,7 @@ class System:
         self._of_command, self.of_friction, self._of_load = rates[:, size:].T.copy()
 
     def under(self, command: float, load: float, slope: float, start: float) -> Rates:
-        """Returns z' of (t, z) under a command held and load + slope (t - start)."""
+        """Returns z' as a function of (t, z), under a held command and load + slope (t - start)."""
         matrix, rise = self._matrix, slope * self._of_load
         push = command * self._of_command + load * self._of_load - start * rise
         return lambda t, z: matrix @ z + push + t * rise

@@ -31,11 +31,11 @@ class _Forces(NamedTuple):
 
 
 class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
-    """As without friction, and started anew where friction switches: events, found on the dense output.
+    """The motion without friction, restarted where friction switches: at events, found on the dense output.
 
-    Slipping ends where v changes its sign; there body 0 sticks, clamped with v = 0.0, if the other forces on it are
-    within the breakaway force. Sticking ends where they exceed it. The books are told one friction force a step, that
-    of the part in which the body slips, so that the residual shows the steps within which friction switched.
+    Slipping ends where v changes sign; there body 0 sticks, clamped with v = 0.0, if the other forces on it are
+    within the breakaway force. Sticking ends where they exceed it. The books get one friction force a step, that of
+    the part in which the body slips, so that the residual shows the steps within which friction switched.
     """
 
     def __init__(self, scene: Scene, time: Timebase) -> None:
@@ -48,7 +48,7 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         return super().advance(tick, holds)
 
     def _through(self, interval: Interval, first: int, last: int, load: float, slope: float) -> None:
-        """Goes through steps ``first`` ... ``last``, from one switch of friction to the next.
+        """Moves through steps ``first`` ... ``last``, from one switch of friction to the next.
 
         Raises:
             ArithmeticError: friction switches again and again, with no time between.
@@ -72,7 +72,7 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         interval.states[last], interval.at_ends[last - 1] = z, (friction, self._mode.is_stuck)
 
     def _after_switch(self, z: np.ndarray, t: float, forces: _Forces, moved: bool) -> StickSlipState:
-        """Returns the mode after the present one has ceased; a slip that led nowhere is none."""
+        """Returns the mode after the present one has ceased; a slip that lasted no time counts as sticking."""
         mode = self._mode
         if mode.is_stuck:
             return StickSlipState(False, math.copysign(1.0, self._other_forces(t, z, forces)))
@@ -83,7 +83,7 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
     def _piece(
         self, interval: Interval, z: np.ndarray, t: float, last: int, forces: _Forces
     ) -> tuple[np.ndarray, float, bool]:
-        """Goes from time t in s to step ``last``, or to where the mode ceases; returns state, time, whether it did."""
+        """Moves from time t in s to step ``last``, or to where the mode ceases; returns state, time, whether it did."""
         mode, h = self._mode, self._step_s
         steps = np.arange(int(t / h), last + 1)
         steps = steps[steps * h > t]
@@ -101,19 +101,19 @@ class Dop853FrictionMotion(RubbingHistory, Dop853Motion):
         return (found.y_events[0][0] if has_ceased else states[:, -1]).copy(), end, has_ceased
 
     def _tell_friction(self, interval: Interval, first: int, last: int, v: float) -> None:
-        """Notes friction in the steps in which the body slips, as at their beginning; ``v`` at that of the first."""
+        """Records friction in the steps in which the body slips, as at their beginning; ``v`` is that of the first."""
         speeds = [v, *interval.states[first + 1 : last, self._v].tolist()]
         for step, speed in zip(range(first, last), speeds, strict=False):
             interval.held[step, 2:] = -self._mode.direction * friction_at(self.friction, speed), 0.0
 
     def _slipping(self, forces: _Forces) -> tuple[Rates, Event]:
-        """Returns z' while body 0 slips, and what falls below 0 when it no longer does: the speed in its direction."""
+        """Returns z' while body 0 slips, and what falls below 0 when it no longer slips: the speed in its direction."""
         law, v, direction = self.friction, self._v, self._mode.direction
         smooth, unit = self._free.under(*forces), -direction * self._free.of_friction
         return (lambda t, z: smooth(t, z) + friction_at(law, z[v]) * unit), _Event(lambda _t, z: direction * z[v])
 
     def _sticking(self, forces: _Forces) -> tuple[Rates, Event]:
-        """Returns z' while body 0 is held, and what falls below 0 when it no longer is: what more could be held."""
+        """Returns z' while body 0 is held, and what falls below 0 when it no longer is: what more it could hold."""
         most = self.friction.holds_N
         return self._clamped.under(*forces), _Event(lambda t, z: most - abs(self._other_forces(t, z, forces)))
 

@@ -1,4 +1,4 @@
-"""The rates of a chain's states, and what all of its one-step methods share."""
+"""The rates of a chain's states, and what all one-step methods share."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ Rows = list[Any]
 
 
 class LinearRates:
-    """z' = A z + p of a chain of bodies, the zeros of A left out.
+    """z' = A z + p of a chain of bodies, without the zeros of A.
 
     Args:
-        stuck: body 0 is held where it is.
+        stuck: whether body 0 is held where it is.
 
     Attributes:
         matrix: A, shape (states, states), 1/s.
-        of_inputs: rates that a unit of command, friction and load bring, shape (3, states).
-        count: number of bodies: rows 0 ... count - 1 of z are lengths, the next as many their rates.
+        of_inputs: rates caused by a unit of command, friction and load, shape (3, states).
+        count: number of bodies: rows 0 ... count - 1 of z are lengths, the next ``count`` rows their rates.
     """
 
     def __init__(self, chain: Chain, stuck: bool = False) -> None:
@@ -55,5 +55,5 @@ def moved(z: Rows, h: float, rates: Rows) -> Rows:
 
 
 def response_to(push: Rows, method: OneStep) -> Rows:
-    """Returns z at the end of a plant step that began with none, under a push held over it."""
+    """Returns z at the end of a plant step that began at z = 0, under a push held over it."""
     return method.step([0.0] * len(push), push, push, push)

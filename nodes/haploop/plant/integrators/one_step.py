@@ -24,8 +24,8 @@ class Euler:
 class SemiImplicitEuler:
     """v+ = v + h a(x, v), x+ = x + h v+: lengths follow the rates that were just found.
 
-    Order 1. For undamped bodies it is symplectic: up to w h = 2 their energy swings, by a part of w h, and stays; for
-    a single oscillator v^2 + w^2 x^2 - w^2 h x v is kept (Hairer, Lubich and Wanner 2006, I.1.2 and IX.3).
+    Order 1. For undamped bodies it is symplectic: up to w h = 2 their energy oscillates by a fraction w h, but does not
+    drift; for a single oscillator v^2 + w^2 x^2 - w^2 h x v is kept (Hairer, Lubich and Wanner 2006, I.1.2 and IX.3).
     """
 
     def __init__(self, rates: LinearRates, step_s: float) -> None:
@@ -43,14 +43,14 @@ class ImplicitMidpoint:
 
     With m = (z + z+) / 2 this is m = z + h/2 (A m + p), so m = (I - h/2 A)^-1 (z + h/2 p) and z+ = 2 m - z. Order 2,
     stable at every step, and every quadratic energy of undamped bodies is kept (Hairer, Lubich and Wanner 2006, IV.2);
-    but a swing with w h > 1 is far too slow, its phase advances by 2 atan(w h / 2) and never by more than pi.
+    but a swing with w h > 1 is far too slow: its phase advances by 2 atan(w h / 2), never by more than pi.
     """
 
     def __init__(self, rates: LinearRates, step_s: float) -> None:
         self._half = step_s / 2.0
         implicit = np.eye(len(rates.matrix)) - step_s / 2.0 * rates.matrix
         inverse = np.linalg.inv(implicit.astype(float)).astype(np.longdouble)
-        inverse = 2.0 * inverse - inverse @ implicit @ inverse  # one step of Newton's, to the last digit
+        inverse = 2.0 * inverse - inverse @ implicit @ inverse  # one Newton step, to the last digit
         self._inverse = inverse.astype(float).tolist()
 
     def step(self, z: Rows, _begin: Rows, middle: Rows, _end: Rows) -> Rows:
@@ -62,8 +62,8 @@ class ImplicitMidpoint:
 class RungeKutta4:
     """Four rates, at the beginning, twice in the middle and at the end, weighted 1 : 2 : 2 : 1 (Kutta 1901).
 
-    Order 4. An undamped swing is stable up to w h = 2 sqrt(2); below that it loses a part (w h)^6 / 72 of its energy
-    every step, which no damper took.
+    Order 4. An undamped swing is stable up to w h = 2 sqrt(2); below that it loses a fraction (w h)^6 / 72 of its
+    energy every step, which no damper took.
     """
 
     def __init__(self, rates: LinearRates, step_s: float) -> None:

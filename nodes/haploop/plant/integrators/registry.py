@@ -1,4 +1,4 @@
-"""The registry of integrators: one line for each."""
+"""The registry of integrators: one entry for each."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from haploop.protocol.scene.scene import Scene
 if TYPE_CHECKING:
     from haploop.plant.integrators.linear_rates import OneStep
 
-# Other packages name the objects of theirs in this group of entry points.
+# Other packages name their integrators in this group of entry points.
 _GROUP = "haploop.integrators"
 
 
@@ -20,12 +20,12 @@ class Integrator:
     """A method that moves the bodies from one plant step to the next.
 
     Attributes:
-        name: in ``clock.integrator``.
-        does: what it makes every plant step, in one phrase.
-        order: of its error in the plant step; None where that depends on no plant step.
-        method: the formula of a one-step method, or its "module:class"; None for a motion of its own.
-        evaluations: of the rates, in every plant step, or in every tick where it chooses its own steps.
-        chooses_steps: whether its steps are its own, at a tolerance, whatever ``clock.plant_rate``.
+        name: its value in ``clock.integrator``.
+        does: what every plant step is with it, in one phrase.
+        order: order of its error in the plant step; None if the error does not depend on the plant step.
+        method: the formula of a one-step method, or its "module:class"; None for one with its own motion.
+        evaluations: evaluations of the rates per plant step, or per tick if it chooses its own steps.
+        chooses_steps: whether it chooses its own steps, at a tolerance, whatever ``clock.plant_rate``.
         motions: "module:class" of the motion without friction and of that with it.
     """
 
@@ -46,16 +46,16 @@ class Integrator:
         return self.order is None
 
     def one_step(self) -> type[OneStep] | None:
-        """Returns the formula of a one-step method; None for a motion of its own."""
+        """Returns the formula of a one-step method; None for an integrator with its own motion."""
         return resolve_name(self.method) if isinstance(self.method, str) else self.method
 
     def make_motion(self, scene: Scene, *args: Any) -> Any:
-        """Makes the motion of a resolved scene; nothing else is imported."""
+        """Makes the motion of a resolved scene; no other is imported."""
         return resolve_name(self.motions[scene.friction is not None])(scene, *args)
 
 
 _HERE = "haploop.plant.integrators"
-# What is written here imports no motion: whoever checks a scene or lists what there is needs none.
+# These entries import no motion: checking a scene or listing the integrators needs none.
 _BUILT_IN = (
     Integrator(
         "exact",
@@ -109,12 +109,12 @@ def integrator_module(name: str) -> str:
 
 
 def find_integrator(name: str) -> Integrator:
-    """Returns the integrator of a name, KeyError for none; of other packages no other is imported."""
+    """Returns the integrator with this name, importing no other package's; raises KeyError if there is none."""
     return INTEGRATORS[name] if name in INTEGRATORS else resolve_name(_places()[name])
 
 
 def _places() -> dict[str, str]:
-    """Returns module and name of the integrators of other packages; whoever uses none of them needs no search."""
+    """Returns module and name of the integrators of other packages; using none of them needs no search."""
     from haploop.protocol.installed import entry_points_of
 
     return {entry.name: entry.value for entry in entry_points_of(_GROUP)}

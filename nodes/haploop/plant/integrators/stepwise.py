@@ -1,4 +1,4 @@
-"""The motion of a chain of bodies by a one-step method, from plant step to plant step, and how it grows by itself."""
+"""The motion of a chain of bodies by a one-step method, from plant step to plant step, and its growth if left alone."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from haploop.plant.line import Hold
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
-# A run that diverges ends at the next tick. Until then bodies this fast stand still: their squares would overflow.
+# A run that diverges ends at the next tick. Until then bodies this fast are not moved: their squares would overflow.
 _LOST_M_S = 1e50
 
 
 class StepwiseMotion(ChainHistory):
     """z' = A z + B (command, friction, load) by ``clock.integrator``, every plant step by its formula.
 
-    Command and friction are held over a plant step, the load is linear in it, as in the exact motion. What the method
-    makes of it is its own, and so is energy that no element took or gave: the books, which know the exact integrals
-    from each state on, show it in their residual. Digits below the rounding of a float are not kept.
+    Command and friction are held over a plant step, the load is linear in it, as in the exact motion. The error is the
+    method's own, and so is energy that no element took or gave: the books, which know the exact integrals from each
+    state on, show this energy in their residual. Digits below the rounding of a float are not kept.
     """
 
     def __init__(self, scene: Scene, time: Timebase) -> None:
@@ -38,7 +38,7 @@ class StepwiseMotion(ChainHistory):
         return self._accept(tick, interval)
 
     def _fill_in(self, interval: Interval, loads: np.ndarray) -> None:
-        """Fills in the states; ``loads`` at every step and at the end, N."""
+        """Fills in the states; ``loads`` are those at every step and at the end, N."""
         load = np.stack([loads[:-1], (loads[:-1] + loads[1:]) / 2.0, loads[1:]])
         pushes = interval.held[:, 0, None] * self._of_command + load[:, :, None] * self._of_load
         step, v, z = self._step, self._v, self.state.z.tolist()
@@ -54,7 +54,7 @@ def growth(scene: Scene) -> float:
     """Returns the factor by which the fastest growing motion of a scene's bodies, left alone, grows in a plant step.
 
     It is the spectral radius of the one-step matrix; above 1 the method is unstable whatever the controller does. A
-    body that nothing holds drifts, which is no growth: its factor is 1. The scene is resolved, its integrator a
+    body that nothing holds drifts, which is not growth: its factor is 1. The scene must be resolved, its integrator a
     one-step method.
     """
     rates, method, step_s = _method_of(scene)
@@ -65,7 +65,10 @@ def growth(scene: Scene) -> float:
 
 
 def friction_brakes(scene: Scene) -> bool:
-    """Tells whether a force on body 0 speeds it up its own way over a plant step; else the step is too long."""
+    """Tells whether a force on body 0 speeds it up in the force's direction over a plant step.
+
+    If it does not, the step is too long.
+    """
     rates, method, _ = _method_of(scene)
     return response_to(rates.of_inputs[1].tolist(), method)[rates.count] > 0.0
 

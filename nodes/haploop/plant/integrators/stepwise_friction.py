@@ -13,13 +13,13 @@ from haploop.protocol.ticks import Timebase
 
 
 class FrictionProjection:
-    """Friction held over the step, f = -clip(v_free / g, -most, most), as a one-step method round another.
+    """Friction held over the step, f = -clip(v_free / g, -most, most), as a one-step method around another.
 
-    v_free is v of body 0 at the end of the step without friction, g what a unit of it does to that v by the method's
-    own formula, so that the step is the method's own under f. ``most`` is F(v) by Stribeck's law at the beginning, the
-    breakaway force at rest. Where f is enough, v is 0.0 exactly; a body that was at rest stays, its x to the bit, and
-    the rest of the chain follows the rates of the clamped system. Stops and starts fall on plant steps, which leaves
-    every method, whatever its order, an error of order h in their times.
+    v_free is v of body 0 at the end of the step without friction, g what a unit of friction adds to that v by the
+    method's own formula, so that the step is the method's own under f. ``most`` is F(v) by Stribeck's law at the
+    beginning, the breakaway force at rest. Where f is enough, v is exactly 0.0; a body that was at rest stays, its x to
+    the bit, and the rest of the chain follows the rates of the clamped system. Stops and starts fall on plant steps, so
+    that every method, whatever its order, has an error of order h in their times.
     """
 
     def __init__(self, friction: Friction, free: OneStep, clamped: OneStep, rates: LinearRates) -> None:
@@ -52,7 +52,7 @@ class FrictionProjection:
         return push
 
     def take_rows(self) -> np.ndarray:
-        """Returns friction in N and stuck (1.0 or 0.0) over every step since the last call, then at its end."""
+        """Returns friction in N and stuck (1.0 or 0.0) for every step since the last call: over it, then at its end."""
         rows = np.array(self._rows).reshape(-1, 4)
         self._rows = []
         return rows

@@ -1,6 +1,6 @@
 """The line from the controller to the device: delay, jitter, loss, and the actuator at its end.
 
-``delay.make_line`` makes the line of a scene; here stands what all lines have in common.
+``delay.make_line`` makes the line of a scene; this module has what all lines share.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ class Line(Protocol):
     """The path of the commands to the device.
 
     Attributes:
-        counters: of what may befall a command, by the name of its column.
-        state: a tree of numbers and forces, enough to go on from.
+        counters: counters of what may happen to a command, by the name of their column.
+        state: a tree of numbers and forces, enough to continue from.
     """
 
     @property
@@ -31,21 +31,21 @@ class Line(Protocol):
     def state(self) -> Any: ...
 
     def restore(self, state: Any, /) -> None:
-        """Goes on from a state."""
+        """Continues from a state."""
 
     def receive(self, forces: list[Any], /) -> None:
         """Takes the next commands, in order of their ticks."""
 
     def holds(self, tick: int, /) -> list[Hold]:
-        """Returns the forces held in interval ``tick``, in order: all its steps, no hold of none.
+        """Returns the forces held in interval ``tick``, in order: they cover all its steps, and none has 0 steps.
 
-        It is to be called for every interval, once, from 0 on; commands up to tick - L must have been received.
+        It must be called once for every interval, from 0 on; commands up to tick - L must have been received.
         """
         ...
 
     def retimed(self, delay_steps: int, tick: int, /) -> Line:
-        """Returns a line with another delay of the commands from ``tick`` on, in plant steps; the others are on it."""
+        """Returns a line with another delay, in plant steps, of commands from ``tick`` on; earlier ones stay on it."""
         ...
 
     def select(self, kept: np.ndarray, /) -> None:
-        """Drops the members of a batch that are not kept, shape (members,)."""
+        """Drops the members of a batch that are not kept; ``kept`` is their mask, shape (members,)."""

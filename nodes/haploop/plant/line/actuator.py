@@ -1,4 +1,4 @@
-"""The actuator: steps of force and saturation of every command that takes effect."""
+"""The actuator: resolution and saturation of the force of every command that takes effect."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from haploop.protocol.trees import tree_select
 class Actuator(NamedTuple):
     """Force = q rint(command / q), clipped to +-saturation.
 
-    A command that is no finite number passes unchanged; it ends the run. Either (N) may be None; in a batch a number
-    for all members or an array of shape (members,).
+    A command that is not a finite number passes unchanged; it ends the run. Either parameter (N) may be None; in a
+    batch it is a number for all members or an array of shape (members,).
     """
 
     resolution: Any
@@ -37,11 +37,11 @@ class Actuator(NamedTuple):
 
 
 class ActuatedLine:
-    """Line with an actuator at its end, which sees the commands that another line brings.
+    """A line with an actuator at its end, which receives the commands that another line delivers.
 
     Attributes:
-        actuator: its parameters; the bandwidth is the motion's.
-        state: (of the line, tick of the command in effect last, its force in N, saturated commands).
+        actuator: its parameters; the motion applies the bandwidth.
+        state: (state of the line, tick of the command in effect last, its force in N, saturated commands).
         counters: those of the line and, where there is a saturation, the commands it clipped, each at its first step.
     """
 

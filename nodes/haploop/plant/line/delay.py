@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class DelayLine:
-    """Line of a round-trip delay of d = L n + r steps: command k acts from step k n + d on.
+    """Line with a round-trip delay of d = L n + r steps: command k acts from step k n + d on.
 
     In interval k command k - L - 1 still holds for the first r steps and command k - L for the rest; before the first
     command the force is 0. Commands are kept no longer than they are in flight.

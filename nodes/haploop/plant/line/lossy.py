@@ -18,18 +18,18 @@ from haploop.protocol.ticks import Timebase
 class LossyLine:
     """Command k takes effect at step e_k = k n + d + j_k, unless it is lost; the device holds the last one.
 
-    Of two commands the later one has the last word: command k is dropped if a later one has begun to act before e_k,
-    and acts for no time if a later one takes effect at e_k too. Commands on their way are kept in a queue along which
-    both k and e_k rise: one that arrives removes from its end all those it overtakes. What would take effect beyond
-    the end of the run neither acts nor counts.
+    Of two commands the later one prevails: command k is dropped if a later one has begun to act before e_k, and acts
+    for no time if a later one takes effect at e_k too. Commands in flight are kept in a queue along which both k and
+    e_k rise: a new one removes from its end all those that it overtakes. A command that would take effect beyond the
+    end of the run neither acts nor counts.
 
     Since j_k >= 0, interval k still needs no command later than k - L.
 
     Attributes:
-        delay_steps: of the commands still to come.
+        delay_steps: delay of the commands still to come.
         additional_steps: returns j of the next command, whole plant steps, >= 0.
         is_lost: tells whether the next command is lost.
-        state: (commands received, delay of those to come, those on their way as (step of effect, force, tick), the
+        state: (commands received, delay of those to come, those in flight as (step of effect, force, tick), the
             force and the tick of the one in effect, dropped commands, lost commands).
         counters: commands dropped and lost, each at the step at which it would have taken effect.
     """
@@ -114,7 +114,7 @@ def make_jitter(table: Jitter | None, seed: int, plant_rate: int, first: int = 0
 
 
 def make_loss(table: Loss | None, seed: int, first: int = 0) -> Draw:
-    """Makes the losses of the commands from ``first`` on, each by itself with the same probability."""
+    """Makes the losses of the commands from ``first`` on, independent of one another and of equal probability."""
     if table is None:
         return repeat(False).__next__
     uniform, probability = RandomStream(seed, "loss").uniform(first), table.probability

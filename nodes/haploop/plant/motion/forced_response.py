@@ -1,4 +1,4 @@
-"""The response of one mass to the hand's force alone, made beforehand for every plant step."""
+"""The response of one mass to the hand's force alone, computed beforehand for every plant step."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from haploop.protocol.trees import tree_select
 
 # Responses are made for this many intervals at a time, on a fixed grid.
 _PIECE_TICKS = 256
-# Where every member of a batch has a response of its own, fewer intervals of it are made at a time.
+# If every member of a batch has its own response, it is made for fewer intervals at a time.
 _PIECE_TICKS_OF_EACH = 8
 
 
 def forced_response(transition: FohTransition, start: Any, rise: Any) -> Iterator[tuple[Any, Any]]:
-    """Yields the forced (zero-state) response of x (m) and v (m/s) at every step of intervals but their start.
+    """Yields the forced (zero-state) response of x (m) and v (m/s) at every step of intervals except their start.
 
     ``start`` and ``rise``: load at the start of each step and its rise over it, N, shape (n, intervals). What is
-    yielded is of shape (intervals,) each; all may have a last axis for the members of a batch.
+    yielded has shape (intervals,) each; all may have a last axis for the members of a batch.
     """
     s = transition
     push_x, push_v = s.x_force * start + s.x_slope * rise, s.v_force * start + s.v_slope * rise
@@ -33,9 +33,9 @@ def forced_response(transition: FohTransition, start: Any, rise: Any) -> Iterato
 
 
 class ForcedResponse:
-    """Response to tau and the spring's rest, from zero at the start of every interval of n steps: a cache, no state.
+    """Response to tau and the spring's rest position, from zero at the start of every interval of n steps: a cache.
 
-    It does not depend on the controller, and is made piece by piece of the run.
+    It has no state, does not depend on the controller, and is computed for one piece of the run after another.
 
     Attributes:
         rest_N: force of the spring with the device at the origin, k x_rest.
@@ -54,13 +54,13 @@ class ForcedResponse:
         return self.tau.at_steps(first, last) + self.rest_N
 
     def ends(self, tick: int) -> tuple[int, list[Any]]:
-        """Returns (first interval of the piece with ``tick``, what is added to (x, v) over each interval of it)."""
+        """Returns (first interval of the piece with ``tick``, what it adds to (x, v) over each of its intervals)."""
         piece = tick // self._piece_ticks
         at_ends = self._piece(piece)[:, -1].swapaxes(0, 1)
         return piece * self._piece_ticks, at_ends.tolist() if at_ends.ndim == 2 else list(at_ends)
 
     def between(self, tick: int, ticks: int) -> np.ndarray:
-        """Returns the response of x and v in some intervals, shape (2, n + 1, ticks, ...), the last step their end."""
+        """Returns the response of x and v in some intervals, shape (2, n + 1, ticks, ...), their end as last step."""
         size = self._piece_ticks
         first, last = tick // size, max(tick, tick + ticks - 1) // size
         pieces = [self._piece(piece) for piece in range(first, last + 1)]

@@ -11,9 +11,9 @@ from haploop.protocol.scene import hand_force as tables
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.trees import tree_leaves, tree_select
 
-# The force is made in pieces on a fixed grid, so that how a run is cut into messages cannot change a bit of it.
+# The force is made in pieces on a fixed grid, so that the way a run is cut into messages cannot change a bit of it.
 _PIECE_STEPS = 4096
-# Where every member of a batch has a force of its own, fewer steps of it are made at a time.
+# If every member of a batch has its own force, it is made for fewer steps at a time.
 _PIECE_STEPS_OF_EACH = 256
 
 # Other packages name their forces in this group of entry points.
@@ -72,7 +72,7 @@ def make_hand_force(scene: Scene, plant_rate: int, members: int | None = None) -
 
 
 def constant_forces(scene: Scene) -> dict[str, float]:
-    """Returns the constant forces on the last body that effects of other packages bring, N, by the key of their table.
+    """Returns the constant forces of other packages' effects on the last body, N, by the key of the effect's table.
 
     The group of entry points ``haploop.forces`` names, by that key, functions that make the force of a resolved scene.
     """

@@ -58,7 +58,7 @@ class Mechanics:
 
 
 class OneMassState(NamedTuple):
-    """Position in m and velocity in m/s, and what rounding left of each (compensated addition).
+    """Position in m and velocity in m/s, and the digits that rounding left over of each (compensated addition).
 
     Floats, or arrays of shape (members,).
     """
@@ -72,13 +72,13 @@ class OneMassState(NamedTuple):
 def advance(over: Any, state: tuple[Any, ...], holds: Sequence[Hold], drive: Any, noted: list[Any]) -> tuple[Any, ...]:
     """Moves one mass through an interval: returns the entries of ``OneMassState`` at its end.
 
-    Over a hold of i steps y+ = y + (e^{A i h} - I) y + (integral of e^{A s} ds) f / m, for floats, arrays of NumPy or
-    of jax.
+    Over a hold of i steps y+ = y + (e^{A i h} - I) y + (integral of e^{A s} ds) f / m, for floats, and for arrays of
+    NumPy or jax.
 
     Args:
         over: coefficients of ``make_zoh_transitions``, indexed by the number of steps.
         drive: what the forced response adds to (x, v) by the end of the interval.
-        noted: takes seven entries for every hold: steps, x, v, x_comp and v_comp at its beginning, force, command.
+        noted: receives seven entries for every hold: steps, x, v, x_comp and v_comp at its beginning, force, command.
     """
     x, v, x_comp, v_comp = state
     last = holds[-1]
@@ -101,19 +101,19 @@ def advance(over: Any, state: tuple[Any, ...], holds: Sequence[Hold], drive: Any
 class OneMassMotion:
     """m a + b v + k x = f + tau + k x_rest, f held, tau piecewise linear between plant steps.
 
-    The motion is a sum z = y + D. D, the forced response to tau and the spring's rest from zero at the start of an
-    interval, does not depend on the controller and is made beforehand for every plant step. y starts as z and follows
-    the held forces. So a hold costs one step whatever its length, and the plant steps within it are filled in when
-    they are recorded.
+    The motion is a sum z = y + D. D, the forced response to tau and the spring's rest position from zero at the start
+    of an interval, does not depend on the controller and is computed beforehand for every plant step. y starts equal to
+    z and follows the held forces. A hold thus costs one step whatever its length, and the plant steps within it are
+    filled in when they are recorded.
 
     Args:
         scene: a resolved scene; in a batch a stacked one, whose numbers are floats, or arrays of shape (members,).
-        time: the integers of the run; in a batch those all members share, whose delay does not change.
+        time: the timebase of the run; in a batch the one that all members share, whose delay does not change.
         members: of a batch; None for one run.
 
     Attributes:
-        held: coefficients of ``make_zoh_transitions``; in a batch with a last axis, of length 1 where all share them.
-        fill: fills in the record of a batch in the place of ``fill_steps``.
+        held: coefficients of ``make_zoh_transitions``; in a batch with a last axis, of length 1 if all share them.
+        fill: fills in the record of a batch in place of ``fill_steps``.
     """
 
     fill: Fill | None = None
@@ -179,8 +179,8 @@ class OneMassMotion:
         """Returns the record from interval ``tick`` on, and starts a new one: every plant step and the present state.
 
         Returns:
-            x, v, x_low (x_comp), force and command, of these x and command with ``positions_only``; shape (steps + 1,)
-            each. In a batch (steps + 1, members), but for ``command``, which all members share, and beside them
+            x, v, x_low (x_comp), force and command; x and command alone with ``positions_only``; shape (steps + 1,)
+            each. In a batch (steps + 1, members), except ``command``, which all members share, and in addition
             ``held_N``, the force of every hold, shape (holds, members).
         """
         noted, self._noted = self._noted, []
@@ -205,6 +205,6 @@ class OneMassMotion:
 
 
 def sensed_acceleration(mechanics: Mechanics, state: OneMassState, force: Any, tau: Any) -> Any:
-    """Returns the acceleration in a state under a force of the actuator and one of the hand in N, m/s^2."""
+    """Returns the acceleration in a state, m/s^2, under a force of the actuator and one of the hand, N."""
     m = mechanics
     return (force + tau - m.damping * state.v - m.stiffness * (state.x - m.rest_m)) / m.mass_kg

@@ -20,14 +20,14 @@ Fill = Callable[[np.ndarray, np.ndarray, Sequence[np.ndarray], Rows, int, int], 
 
 
 def change_over(held: Any, response: Any, x: Any, v: Any, force: Any, comp: Any) -> Any:
-    """Returns what the plant steps of holds add to x or v, from the beginning of each hold, one hold an interval.
+    """Returns what the plant steps of holds add to x or v at the beginning of each hold, for one hold per interval.
 
     Args:
         held: coefficients of x, v and force over these steps, shape (steps, 1) each.
         response: the forced response at these steps of every interval, shape (steps, intervals).
         x, v: at the beginning of every hold, shape (intervals,).
         force: held, N, shape (intervals,).
-        comp: what rounding left of x or v at the beginning, shape (intervals,).
+        comp: compensation of x or v at the beginning, shape (intervals,).
 
     Returns:
         Shape (steps, intervals); all shapes may have one more axis, for the members of a batch.
@@ -49,10 +49,10 @@ def fill_steps(
     first: int,
     count: int,
 ) -> None:
-    """Fills in one hold of many intervals: ``count`` steps from ``first`` on of each.
+    """Fills in one hold of many intervals: ``count`` steps from ``first`` on in each.
 
     Step i of a hold that began at y is y plus the transition of i steps, plus the forced response. An interval begins
-    with a known state: where the one before ended.
+    with a known state: the end of the one before.
 
     Args:
         response: of these intervals, shape (2, n + 1, intervals, ...).
@@ -95,8 +95,8 @@ def record_of_holds(
         fill: does what ``fill_steps`` does.
 
     Returns:
-        Shape (steps + 1, *tail) each, the last row left to be filled in, but for ``command``, of shape (steps + 1,); in
-        a batch beside them ``held_N``, the force of every hold, shape (holds, members).
+        Shape (steps + 1, *tail) each, except ``command``, of shape (steps + 1,); the last row is left to be filled in.
+        In a batch in addition ``held_N``, the force of every hold, shape (holds, members).
     """
     n = len(held) - 1
     width = _width(noted, 0, n)
@@ -112,7 +112,7 @@ def record_of_holds(
 
 
 def _width(noted: list[Any], at: int, n: int) -> int:
-    """Returns the number of entries noted of the interval that begins at an entry."""
+    """Returns the number of entries noted for the interval that begins at entry ``at``."""
     steps, end = 0, at
     while steps < n and end < len(noted):
         steps += noted[end]
@@ -121,7 +121,7 @@ def _width(noted: list[Any], at: int, n: int) -> int:
 
 
 def _by_cut(noted: list[Any], n: int) -> Iterator[tuple[list[int], list[Any]]]:
-    """Yields (steps of each hold of an interval, entries) of the runs of intervals that are cut alike."""
+    """Yields (steps of each hold, entries) for every series of consecutive intervals that are cut alike."""
     intervals, at = [], 0
     while at < len(noted):
         intervals.append(noted[at : at + _width(noted, at, n)])
@@ -156,7 +156,7 @@ def _alike(
 def _columns(noted: list[Any], holds: int, tail: tuple[int, ...]) -> Iterator[tuple[np.ndarray, ...]]:
     """Yields x, v, x_comp, v_comp, force and command of the i-th holds of all intervals, shape (intervals, *tail).
 
-    Those of ``command`` are of shape (intervals,).
+    The command alone has shape (intervals,).
     """
     if not tail:
         table = np.frombuffer(array("d", noted)).reshape(-1, holds or 1, NOTED)

@@ -1,4 +1,4 @@
-"""Exact transition of a linear mechanical system over a plant step, and the exact integrals its books need."""
+"""Exact transition of a linear mechanical system over a plant step, and the exact integrals for its energy books."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def transition_minus_identity(rates: Matrix, duration: Real, levels: Matrix = _W
     Args:
         rates: A, shape (n, n), 1/s.
         duration: 2^level t, s.
-        levels: of t, shape (...); all from one series, as half the step has its terms times a power of 2, to the bit.
+        levels: levels of t, shape (...). One series serves them all: for half the step its terms are the same times a
+            power of 2, to the bit.
 
     Returns:
         Shape (..., n, n).
@@ -59,7 +60,7 @@ def gramian(rates: Matrix, weight: Matrix, duration: Real, levels: Matrix = _WHO
         rates: A, shape (n, n), 1/s.
         weight: Q, symmetric to the bit, shape (n, n), or several, shape (weights, n, n).
         duration: 2^level t, s.
-        levels: of t, shape (...); see ``transition_minus_identity``.
+        levels: levels of t, shape (...); see ``transition_minus_identity``.
 
     Returns:
         Shape (..., n, n), or (..., weights, n, n).
@@ -89,17 +90,17 @@ def _short_step(rates: Matrix, duration: Real) -> tuple[Any, int]:
 
 
 def _beside(levels: Matrix, of: Matrix) -> Matrix:
-    """Returns levels with an axis for each of a matrix, or of several."""
+    """Returns ``levels`` with a further axis for each axis of ``of``, a matrix or several."""
     return levels.reshape(*levels.shape, *[1] * of.ndim)
 
 
 def _parts(levels: Matrix, of: Matrix) -> Matrix:
-    """Returns which part of the step of the series is left at each level below it; all of it above."""
+    """Returns the fraction of the series' step that each finer level has; 1 at the other levels."""
     return _wide(0.5) ** np.maximum(_beside(levels, of), 0)
 
 
 def _first(series: Matrix, levels: Matrix, of: Matrix) -> Matrix:
-    """Returns the sum of the series over its whole step, where the least level is one that it is doubled for."""
+    """Returns the series at the least level: over its whole step, if it is doubled for that level."""
     return series.reshape(-1, *of.shape)[levels.argmin()]
 
 
@@ -109,8 +110,8 @@ class FohTransition(NamedTuple):
         dx = x_x x + x_v v + x_force F(0) + x_slope (F(h) - F(0))
         dv = v_x x + v_v v + v_force F(0) + v_slope (F(h) - F(0))
 
-    The transition minus the identity, so that a small change keeps all its digits beside a large state. Every
-    coefficient is a float; in a batch of members that differ an array of shape (members,).
+    It is the transition minus the identity, so that a small change keeps all its digits beside a large state. Every
+    coefficient is a float; in a batch of members that differ, an array of shape (members,).
     """
 
     x_x: Any
@@ -180,16 +181,17 @@ def _to_state(increment: Matrix, mass: float, stiffness: float, step_s: float) -
 
 
 def natural_rate(mass: float, stiffness: float, step_s: float) -> float:
-    """Returns c in 1/s, which makes c x comparable to v: the natural frequency, but at least one over the step."""
+    """Returns c in 1/s, which makes c x comparable to v: the natural frequency, but at least 1 / step."""
     return max(math.sqrt(stiffness / mass), 1.0 / step_s)
 
 
 def motion_integrals(mass: float, damping: float, stiffness: float, step_s: float) -> tuple[Matrix, Matrix]:
-    """Returns the exact integrals over one step for heat and lagged displacement, from its rates at the start.
+    """Returns the exact integrals over one step for heat and lagged displacement, from the rates at its start.
 
     The rates are w = (v(0), a(0) / c, F' h / (m c)).
-    Differentiating m a + b v + k x = F once gives w its own linear system, w' = R w with v = w_0; F' is constant
-    within a step and c is ``natural_rate``. In rates nothing cancels when a large force holds the device at rest.
+    Differentiating m a + b v + k x = F once gives a linear system for w itself, w' = R w with v = w_0; F' is constant
+    within a step and c is ``natural_rate``. In terms of rates nothing cancels when a large force holds the device at
+    rest.
 
     Returns:
         In the widest float, (square, lag): integral of v(t)^2 dt = w' square w, shape (3, 3), s; and

@@ -20,7 +20,7 @@ from haploop.protocol.trees import tree_select
 class Reading(NamedTuple):
     """Parameters of a reading: (a + bias + noise), clipped to +-range, rounded to the nearest count within the range.
 
-    What is None does not act. In a batch numbers may be arrays of shape (members,).
+    A parameter that is None has no effect. In a batch numbers may be arrays of shape (members,).
 
     Attributes:
         bias, range, resolution: m/s^2.
@@ -42,7 +42,7 @@ class Reading(NamedTuple):
         is_clipped: Any = False
         if most is not None:
             limited = clipped(value, most)
-            if limited is not value or value != value:  # no float within the range
+            if limited is not value or value != value:  # not a float within the range
                 inside = (value >= -most) & (value <= most)
                 is_clipped = not inside if inside.__class__ is bool else ~inside
             value = limited
@@ -52,12 +52,11 @@ class Reading(NamedTuple):
 
 
 class Accelerometer:
-    """An accelerometer read once a tick. The effect of its bandwidth on the acceleration, and its delay, are the
-    motion's.
+    """An accelerometer read once a tick; the motion applies its delay and the effect of its bandwidth on the signal.
 
     The noise is white with one-sided density D (m/s^2/sqrt(Hz)). Through a first-order bandwidth B its deviation is
-    D sqrt(pi / 2 B), and it is correlated from tick to tick; without a bandwidth the sensor passes what the tick rate
-    can tell, D sqrt(rate / 2), and it is white.
+    D sqrt(pi / 2 B), and it is correlated from tick to tick; without a bandwidth the sensor passes all that the tick
+    rate can resolve: the deviation is D sqrt(rate / 2), and the noise is white.
 
     Attributes:
         draw: returns the next standard normal number of the noise, or a row of them; None without noise.
@@ -106,7 +105,7 @@ class Accelerometer:
 
 
 def make_accelerometer(scene: Scene, time: Timebase, members: int | None = None) -> Accelerometer | None:
-    """Makes what reads the true acceleration; None where it is read as it is, or not at all."""
+    """Makes the sensor of the true acceleration; None if this is read unchanged, or not at all."""
     if scene.accelerometer is None or not accelerometer_is_used(scene):
         return None
     return Accelerometer(scene.accelerometer, scene.seed, time, members)

@@ -15,14 +15,14 @@ ROUNDINGS = {"nearest": rint, "floor": floor}
 
 
 def make_encoder(table: Encoder | None) -> Callable[[Any], Any]:
-    """Makes the function from true to measured position: q rint(x / q) or q floor(x / q); without a table x itself."""
+    """Makes the function from true to measured position: q rint(x / q) or q floor(x / q); without a table, x itself."""
     if table is None:
         return lambda x: x
     resolution, whole = table.resolution, ROUNDINGS[table.rounding]
     if whole is not rint:
         return lambda x: resolution * whole(x / resolution)
 
-    def nearest(x: Any) -> Any:  # as with ``whole``, which is a call less for one number
+    def nearest(x: Any) -> Any:  # the same as with ``whole``, with one call less for a number
         counts = x / resolution
         return resolution * (float(round(counts)) if counts.__class__ is float else rint(counts))
 
@@ -34,7 +34,7 @@ class PositionSensor:
 
     Attributes:
         reading: returns the measured position of x in m at the next tick; to be called at every tick from tick 0 on.
-        state: none, for a sensor without noise.
+        state: empty for a sensor without noise.
     """
 
     def __init__(self, encoder: Encoder | None) -> None:
@@ -46,7 +46,7 @@ class PositionSensor:
         return ()
 
     def restore(self, state: Any) -> None:
-        """Goes on from a state."""
+        """Continues from a state."""
 
     def select(self, kept: np.ndarray) -> None:
         self.encoder = tree_select(self.encoder, kept)

@@ -25,7 +25,7 @@ class Noise(NamedTuple):
     What lies above half the tick rate is folded back, as by any sampler (Uhlenbeck and Ornstein 1930).
 
     Attributes:
-        deviation: sigma; in a batch a number for all members or an array of shape (members,), as the others.
+        deviation: sigma; in a batch a number for all members or an array of shape (members,), like the others.
         keep: rho, or None for white noise.
         fresh: sigma sqrt(1 - rho^2), or None for white noise.
     """
@@ -35,14 +35,14 @@ class Noise(NamedTuple):
     fresh: Any = None
 
     def after(self, before: Any, draw: Any) -> Any:
-        """Returns the noise at a tick after that of the tick before (None at tick 0), from a standard normal number."""
+        """Returns the noise at a tick from that of the tick before (None at tick 0) and a standard normal number."""
         if before is None or self.keep is None:
             return self.deviation * draw
         return self.keep * before + self.fresh * draw
 
 
 def make_noise(deviation: Any, cutoff_Hz: Any, period_s: float) -> Noise:
-    """Makes band-limited noise of a deviation, a cutoff at which the spectrum has fallen to half, and a tick."""
+    """Makes band-limited noise from its deviation, the cutoff at which its spectrum is down to half, and the tick."""
     decay = -math.tau * cutoff_Hz * period_s
     keep, fresh = each(math.exp, decay), deviation * each(math.sqrt, -each(math.expm1, 2.0 * decay))
     return Noise(deviation, keep, fresh)
@@ -76,7 +76,7 @@ class NoisyPositionSensor(PositionSensor):
         return self._measured, self._last
 
     def go_on(self, measured: int, noise: Any) -> None:
-        """Goes on from a noise after so many ticks, whose numbers have all been drawn."""
+        """Continues from the noise after ``measured`` ticks, whose numbers have all been drawn."""
         self._measured, self._last = measured, noise
 
     def restore(self, state: Any) -> None:
