@@ -12,9 +12,9 @@ from haploop.protocol.scene.scene import ElementTable
 
 
 class Description(TypedDict):
-    """An element and its book, as they stand in telemetry and summary; ``parameters`` has ``acts`` beside its own.
+    """An element and its book, as written to telemetry and summary; ``parameters`` has ``acts`` besides its own.
 
-    ``columns`` has the units of what it shows in the log beside its force, and is left out where that is nothing.
+    ``columns`` has the units of what it shows in the log besides its force, and is left out if that is nothing.
     """
 
     book: int
@@ -33,8 +33,8 @@ class ActiveElement:
     Attributes:
         acts: "always", or "in-contact": the force is 0 out of contact.
         book: number of the book, in order of opening within the run.
-        swapped: tick of the swap that brought it, what was in its place, None for nothing, and the plugin file that
-            came with the swap, if any; None for the scene's own.
+        swapped: (tick of the swap that brought it, element that was in its place or None, plugin file that came with
+            the swap or None); None for an element of the scene itself.
     """
 
     element: Element
@@ -56,7 +56,7 @@ class ActiveElement:
 def make_element(table: ElementTable, kinds: Mapping[str, type[Element]]) -> tuple[Element, str]:
     """Makes the element that a validated ``[[dissipation]]`` table names; returns it, and when it acts.
 
-    Raises ElementError where its own code does not take these parameters.
+    Raises ElementError if its own code does not accept these parameters.
     """
     try:
         return kinds[table.name](**table.parameters), table.acts
@@ -67,7 +67,7 @@ def make_element(table: ElementTable, kinds: Mapping[str, type[Element]]) -> tup
 
 
 def keeps_attributes(element: Element) -> bool:
-    """Tells whether an element has attributes beside its parameters, or a container that its class shares."""
+    """Tells whether an element has attributes besides its parameters, or a container that its class shares."""
     kinds = type(element).__mro__[: type(element).__mro__.index(Element)]
     entries = [(name, value) for kind in kinds for name, value in vars(kind).items()]
     slots = any(name == "__slots__" for name, _ in entries)
@@ -80,12 +80,12 @@ def _can_change(value: Any) -> bool:
 
 
 class Unchanged:
-    """Guard of elements whose ``force`` may change nothing but the memory it returns: those of a batch.
+    """Guard of the elements of a batch, whose ``force`` may change nothing except the memory that it returns.
 
-    Members share their elements, so one that keeps attributes of its own would come to other numbers than alone.
+    Members share their elements, so an element with attributes of its own would give other numbers than in a run alone.
 
     Raises:
-        ElementError: an element keeps such attributes; ``check``: it has come to, or has changed a parameter.
+        ElementError: an element keeps such attributes; from ``check``: it has got some, or has changed a parameter.
     """
 
     def __init__(self, active: tuple[ActiveElement, ...]) -> None:
@@ -95,7 +95,7 @@ class Unchanged:
             raise ElementError(f"The element {element.kind} keeps attributes of its own.")
 
     def check(self) -> None:
-        """Looks again, after a tick."""
+        """Checks the elements again, after a tick."""
         for element, known in zip(self._elements, self._known, strict=True):
             now = vars(element).values()
             if len(now) != len(known) or any(new is not old for new, old in zip(now, known, strict=True)):

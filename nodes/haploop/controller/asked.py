@@ -1,4 +1,4 @@
-"""Answers to an element that asks, at a tick, and the memory that they need."""
+"""Answers to an element that asks, at a tick, and the memory that these answers need."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from haploop.protocol.walls.wall import Wall
 
 
 class Declared(NamedTuple):
-    """What a scene declares beside the wall, for elements that ask.
+    """What a scene declares besides the wall, for elements that ask.
 
     Attributes:
         mass, damping: of the device alone, kg and N s/m.
-        whole_ticks, late_steps, steps: of the round-trip delay, and the plant steps in a tick.
+        whole_ticks, late_steps, steps: whole ticks and further steps of the round-trip delay; plant steps in a tick.
     """
 
     mass: Any
@@ -37,7 +37,7 @@ class Declared(NamedTuple):
         return self._replace(whole_ticks=whole, late_steps=late)
 
 
-# What an element asks for to be told the energies that ``Told`` keeps, in their order.
+# The names by which an element asks for the energies that ``Told`` keeps, in the same order.
 ENERGIES = ("wall_energy", "own_energy", "output_energy", "total_energy")
 
 
@@ -46,9 +46,9 @@ class Told(NamedTuple):
 
     Attributes:
         own: the memory that it declares.
-        row: of the tick before, x first, the wall's force fourth, the total last but one; None at its first tick.
-        force, output: the element's force at the tick before, and its sum with the wall's and all before it, N.
-        energies: of wall, element, output and total, each E += -f[k-1] (x_m[k] - x_m[k-1]), J.
+        row: row of the tick before: x first, the wall's force fourth, the total last but one; None at the first tick.
+        force, output: the element's force at the tick before, and its sum with that of the wall and all before it, N.
+        energies: energies of wall, element, output and total, each E += -f[k-1] (x_m[k] - x_m[k-1]), J.
         commands: totals before that of ``row``, newest first, N; as many as may act.
     """
 
@@ -69,9 +69,9 @@ def first_memory(element: Element, declared: Declared) -> Any:
 
 
 def shown(memory: Any, names: Sequence[str]) -> list[float]:
-    """Returns what an element shows in the log beside its force: fields of its memory.
+    """Returns what an element shows in the log besides its force: fields of its memory.
 
-    Raises ElementError where they are no numbers.
+    Raises ElementError if they are not numbers.
     """
     own = memory.own if memory.__class__ is Told else memory
     try:
@@ -90,12 +90,12 @@ def answer_of(
     wall: Wall,
     declared: Declared,
 ) -> tuple[Any, Told]:
-    """Returns the force of an element that asks, and its memory of the next tick.
+    """Returns the force of an element that asks, and its memory for the next tick.
 
     Args:
         now: what every element is told.
-        row: of this tick, complete up to this element; the memory keeps it, and finds it whole at the next tick.
-        force: of the wall and of all elements before this one, N.
+        row: row of this tick, complete up to this element; the memory keeps it, and it is complete by the next tick.
+        force: force of the wall and of all elements before this one, N.
     """
     own, before, force_before, output_before, (wall_J, own_J, output_J, total_J), commands = told
     x, wall_force, total_before, way = now.x, row[3], 0.0, 0.0 * now.x
@@ -133,9 +133,9 @@ def answer_of(
 
 
 def _acted(commands: tuple[Any, ...], declared: Declared) -> Any:
-    """The mean force held over the last period: of c[k-1-L] from its step ``late`` on, of c[k-2-L] before.
+    """Returns the mean force held over the last period: c[k-1-L] from its step ``late`` on, c[k-2-L] before that.
 
-    Where a longer delay has just been set, the oldest command known stands for those before it.
+    If a longer delay has just been set, the oldest known command stands for those before it.
     """
     oldest = len(commands) - 1
     newer, older = (commands[min(declared.whole_ticks + ago, oldest)] for ago in (0, 1))

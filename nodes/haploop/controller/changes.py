@@ -1,4 +1,4 @@
-"""Changes at work: a swap, a set, and a swap taken back, as functions of a controller's parameters and state."""
+"""Changes in a running loop: a swap, a set, and a swap taken back, as functions of controller parameters and state."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Kinds = dict[str, type[Element]]
 def apply_change(
     change: Change, params: ControllerParams, state: ControllerState, kinds: Kinds
 ) -> tuple[ControllerParams, ControllerState]:
-    """Returns parameters and state after a change that was checked before; whatever raises leaves both as they were."""
+    """Returns parameters and state after a change that was checked before; if anything raises, both stay unchanged."""
     if change.swap is not None:
         params, state = _swapped(params, state, change, change.swap, kinds)
     for key, value in change.set.items():
@@ -32,14 +32,14 @@ def apply_change(
 
 
 def code_of(change: Change) -> Kinds:
-    """Loads the plugin that a change comes with; it lies in the run's own directory, put there by the launcher."""
+    """Loads the plugin that comes with a change; the launcher has put it into the run's own directory."""
     return {} if change.plugin is None else load_plugin(Path(change.plugin))
 
 
 def _swapped(
     params: ControllerParams, state: ControllerState, change: Change, table: ElementTable, kinds: Kinds
 ) -> tuple[ControllerParams, ControllerState]:
-    """Returns both with a new element in its place, one more past the end, or one less; a new one's memory is fresh."""
+    """Returns both with an element replaced, appended or removed; the memory of a new one is fresh."""
     if table.name == NO_ELEMENT:
         return _replaced(params, state, change.element, None)
     before = replace(params.elements[change.element], swapped=None) if change.element < len(params.elements) else None
@@ -51,7 +51,7 @@ def _swapped(
 def _replaced(
     params: ControllerParams, state: ControllerState, place: int, active: ActiveElement | None
 ) -> tuple[ControllerParams, ControllerState]:
-    """Returns both with an element in a place, its memory fresh, or with that place gone."""
+    """Returns both with an element put in a place, with a fresh memory, or with that place removed."""
     elements, memories, books = list(params.elements), list(state.elements), params.books
     elements[place : place + 1] = [active] if active else []
     memories[place : place + 1] = [first_memory(active.element, params.declared)] if active else []
@@ -60,15 +60,15 @@ def _replaced(
 
 
 def try_element(place: int, params: ControllerParams, state: ControllerState, sample: Sample) -> None:
-    """Has a new element answer a sample on a copy of everything, so that nothing is changed by it.
+    """Makes a new element answer a sample on a copy of everything, so that the trial changes nothing.
 
     Raises:
-        NoForce: it raises.
-        ElementError: it gives a force that is not finite where the motion is.
+        NoForce: the element raises.
+        ElementError: it gives a force that is not finite although the motion is.
     """
     try:
         copied = deepcopy(params)
-    except Exception:  # an element that holds what cannot be copied is not tried
+    except Exception:  # an element that holds something that cannot be copied is not tried
         return
     *_, row = tick(copied, state, sample)
     x, force = row[0], row[len(MOTION_COLUMNS) + place]
@@ -81,7 +81,7 @@ def try_element(place: int, params: ControllerParams, state: ControllerState, sa
 def take_back(
     place: int, before: ActiveElement | None, params: ControllerParams, state: ControllerState, at: int
 ) -> tuple[Change, ControllerParams, ControllerState]:
-    """Returns the change that undoes a swap, with parameters and state after it; what stood there is made anew."""
+    """Returns the change that undoes a swap, with parameters and state after it; what was there is made again."""
     table = ElementTable(name=NO_ELEMENT)
     if before:
         of = before.element
@@ -94,7 +94,7 @@ def _set(params: ControllerParams, tick: int, path: list[str], value: float) -> 
     match path:
         case ["wall", name] if name in params.wall.values():
             return replace(params, wall=replace(params.wall, **{name: value}))
-        case ["clock", "round_trip_delay"]:  # the plant's to do; elements that ask are told
+        case ["clock", "round_trip_delay"]:  # the plant carries it out; elements that ask are told
             steps = round(value * params.declared.steps / params.motion.period_s)
             return replace(params, declared=params.declared.delayed(steps))
         case ["dissipation", place, name]:
@@ -102,7 +102,7 @@ def _set(params: ControllerParams, tick: int, path: list[str], value: float) -> 
             active = elements[int(place)]
             if name not in active.element.values():
                 raise KeyError(f"the element {active.element.kind} has no {name}")
-            setattr(active.element, name, value)  # in place: what an element keeps of its own stays
+            setattr(active.element, name, value)  # in place, so that what an element keeps of its own stays
             elements[int(place)] = replace(active, book=params.books, from_tick=tick)
             return replace(params, elements=tuple(elements), books=params.books + 1)
     raise KeyError(f"{'.'.join(path)} cannot be set while a loop runs")

@@ -39,7 +39,7 @@ _NEVER = 2**62
 
 
 def make_params(scene: Scene, period_s: float, kinds: Kinds) -> ControllerParams:
-    """Makes the parameters of the controller of a resolved scene, or of a batch in a stacked one."""
+    """Makes the parameters of the controller of a resolved scene, or of a batch given as a stacked scene."""
     made = [make_element(table, kinds) for table in scene.dissipation]
     elements = tuple(ActiveElement(element, acts, book, 0) for book, (element, acts) in enumerate(made))
     wall = make_wall(scene.wall)
@@ -58,10 +58,10 @@ class Controller:
 
     def __init__(self, scene: Scene, time: Timebase, kinds: Kinds, recorder: Recorder | None = None) -> None:
         self._kinds, self._control_rate = dict(kinds), time.control_rate
-        # The code of plugins that came with a swap, with its tick and file: a later one takes the place of one before.
+        # The code of plugins that came with a swap, with its tick and file: later code replaces earlier code.
         self._reloaded: tuple[tuple[int, str | None, Kinds], ...] = ()
         self._restores = scene.run.faulty_swap == "restore"
-        # Before this tick some element is so new that it is taken back where it fails.
+        # Before this tick some element is so new that it is taken back if it fails.
         self._new_until = 0
         self.params = make_params(scene, time.period_s, self._kinds)
         self.state: StateTuple | None = None
@@ -74,11 +74,11 @@ class Controller:
     def fork(
         self, params: ControllerParams | None = None, state: Any = None, recorder: Recorder | None = None
     ) -> Controller:
-        """Returns a controller that goes on from here by itself, without the changes still to come.
+        """Returns a controller that continues from here independently, without the changes still to come.
 
         Args:
-            params, state: of the members that go on; all of them when None.
-            recorder: of a batch.
+            params, state: those of the members that continue; all of them when None.
+            recorder: that of a batch.
         """
         other = copy(self)
         other.params = deepcopy(self.params if params is None else params)  # an element may keep attributes of its own
@@ -95,11 +95,11 @@ class Controller:
         self.recorder.open(self.params)
 
     def learn(self, kinds: Kinds) -> None:
-        """Takes in kinds that a swap to come names; those of plugins stay what they are."""
+        """Adds kinds that a coming swap names; those of plugins stay unchanged."""
         self._kinds = kinds | self._kinds
 
     def schedule(self, tick: int, event: Event) -> None:
-        """Has a checked swap or set take effect at ``tick``, before that tick's force."""
+        """Schedules a checked swap or set to take effect at ``tick``, before that tick's force."""
         change = Change.from_dict(tick, event)
         if DELAY in change.set:
             self.recorder.cover(math.ceil(change.set[DELAY] * self._control_rate) + 2)
@@ -110,7 +110,7 @@ class Controller:
         """Returns the commands in N that answer the next samples, in order.
 
         Raises:
-            ElementError: an element raised, or gave something that is no number.
+            ElementError: an element raised, or gave something that is not a number.
         """
         state, forces, recorder = self.state, [], self.recorder
         if state is None:
@@ -141,7 +141,7 @@ class Controller:
             raise ElementError(f"Element {index} ({kind}) failed at tick {self.tick - 1}: {error}") from error
 
     def _change(self, state: ControllerState, sample: Sample) -> ControllerState:
-        """Carries out what is due; later ticks are written to a new block, since its columns may differ."""
+        """Carries out the changes that are due; later ticks go to a new block, since its columns may differ."""
         self.recorder.cut()
         while self._changes and self._changes[0].tick <= self.tick:
             change = self._changes.pop(0)
@@ -167,10 +167,10 @@ class Controller:
         return state
 
     def _without(self, error: NoForce, state: ControllerState, sample: Sample) -> tuple[StateTuple, list[Any]]:
-        """Returns state and row of this tick after swaps of the last second, whose elements fail, are taken back.
+        """Returns state and row of this tick after taking back the swaps of the last second whose elements fail.
 
         Raises:
-            ElementError: an element fails that no such swap has brought, or the scene asks for the end.
+            ElementError: an element fails that no such swap has brought, or the scene asks to end the run then.
         """
         while True:
             why, place = error.sentence(self.params, self.tick), error.index

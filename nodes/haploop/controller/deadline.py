@@ -1,4 +1,4 @@
-"""An element whose code does not return: at the launcher's signal it is ended by an error that says where it was."""
+"""An element whose code does not return: at the launcher's signal an error ends it and says where it was."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from haploop.controller.asked import answer_of
 from haploop.controller.dissipation.registry import load_source
 from haploop.controller.tick import tick
 
-# Where code of elements is called from, and what it raises becomes a sentence.
+# The functions that call code of elements and turn what it raises into a sentence.
 _CALLERS = {tick.__code__, answer_of.__code__, make_element.__code__, load_source.__code__}
 
 
@@ -20,10 +20,10 @@ class DeadlineOver(SystemExit):
 
 
 def heed_deadline() -> None:
-    """Takes the launcher's signals; in the main thread.
+    """Installs the handlers of the launcher's signals; to be called in the main thread.
 
-    At SIGUSR1 the element's code is ended. SIGUSR2 comes later, where that did not help, since compiled code lets no
-    Python code run: the stack goes to stderr.
+    At SIGUSR1 the element's code is ended. SIGUSR2 comes later if that did not help, since compiled code lets no Python
+    code run: the stack then goes to stderr.
     """
     signal.signal(signal.SIGUSR1, _give_up)
     faulthandler.register(signal.SIGUSR2, file=2, all_threads=False)

@@ -1,4 +1,4 @@
-"""The controller as a process: answers every sample, tells what it did, changes when the clock says so."""
+"""The controller as a process: answers every sample, reports what it did, changes when the clock says so."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class ControllerNode:
         self._loop = ControllerEnd(context, welcome["endpoints"]["plant"], self._idle)
 
     def _places(self, names: set[str]) -> dict[str, str]:
-        """Returns where installed kinds are; those that nobody names are not loaded."""
+        """Returns the places of the installed kinds that are named; the others are not loaded."""
         return {name: place for name, place in self._installed.items() if name in names}
 
     def _schedule(self, events: list[tuple[int, Event]]) -> None:
@@ -75,7 +75,7 @@ class ControllerNode:
     def run(self) -> tuple[int, Message]:
         """Answers until the plant ends the run; returns the number of ticks answered.
 
-        What has been answered is told also where the run fails, here or elsewhere.
+        What has been answered is published even if the run fails, here or elsewhere.
         """
         try:
             return self._run()
@@ -121,7 +121,7 @@ class ControllerNode:
         self._client.poll()
 
     def _idle(self) -> None:
-        """Tells what was held back, says now and then that no sample comes, and serves whoever subscribes meanwhile."""
+        """Publishes what was held back, reports now and then that no sample comes, and serves those who subscribe."""
         if self._controller.tick > self._reported:
             self._flush()
         self._idle_ms += IDLE_MS

@@ -1,4 +1,4 @@
-"""Rows of what the controller saw and did at every tick, kept in blocks of like columns until they are taken."""
+"""Rows of what the controller saw and did at every tick, kept in blocks of equal columns until they are taken."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class Recorder:
 
     A block has ``from_tick``, ``ticks``, ``columns`` (name -> little-endian float64 bytes), ``elements`` (one
     description per dissipation column) and ``wall`` (its numbers, into_wall, and its kind unless it is a spring) as
-    they stood in its ticks.
+    they were at its ticks.
 
     Attributes:
-        refused, restored: changes that were not made; events that tell of swaps taken back.
-        own: index and names of what elements show beside their forces; those end a row.
+        refused, restored: changes that were not made; events that report swaps taken back.
+        own: index of each element that shows more than its force, and the names of what it shows; those end a row.
         history: the newest blocks taken, covering every command that may still be in flight.
-        trouble: the element that first gave a force which is no finite number, as a sentence, or None.
+        trouble: a sentence about the element that first gave a force that is not a finite number, or None.
     """
 
     def __init__(self, history_ticks: int) -> None:
@@ -40,7 +40,7 @@ class Recorder:
         self.own: tuple[tuple[int, tuple[str, ...]], ...] = ()
 
     def open(self, params: ControllerParams) -> None:
-        """Starts a block with the columns of these elements, in which wall and elements are as they are now."""
+        """Starts a block with the columns of these elements, and with wall and elements as they are now."""
         wall = params.wall
         self._begin()
         self.elements = [active.describe() for active in params.elements]
@@ -57,7 +57,7 @@ class Recorder:
         self.add = self._rows.extend
 
     def cover(self, ticks: int) -> None:
-        """Keeps a history of at least so many ticks from now on."""
+        """Keeps a history of at least ``ticks`` ticks from now on."""
         self._history_ticks = max(self._history_ticks, ticks)
 
     def cut(self) -> None:
@@ -106,7 +106,7 @@ class Row(NamedTuple):
 
     Attributes:
         columns: x, v, a, wall, total, in_contact, wall_position, wall_stiffness; floats, or arrays of shape (members,).
-        forces: force of every book at work.
+        forces: force of every active element, by its book.
     """
 
     columns: dict[str, float | np.ndarray]
@@ -122,7 +122,7 @@ class BatchRecorder(Recorder):
         self._taken: list[Row] = []
 
     def open(self, params: ControllerParams) -> None:
-        """Gives the rows to come the columns of these elements and this wall."""
+        """Gives the coming rows the columns of these elements and this wall."""
         super().open(params)
         self.own = ()
         self._shared = {"wall_position": params.wall.position, "wall_stiffness": params.wall.stiffness}

@@ -13,20 +13,20 @@ from haploop.controller.estimators.base import Estimator, Sample
 from haploop.protocol.arrays import where
 from haploop.protocol.walls.wall import Wall
 
-# What stands in the row of a tick before the forces of the elements.
+# The entries in the row of a tick before the forces of the elements.
 MOTION_COLUMNS = ("x", "v", "a", "wall")
 
 
 @dataclass(frozen=True, slots=True)
 class ControllerParams:
-    """Everything that a tick depends on but state and sample; another one takes its place where something changes.
+    """Everything that a tick depends on except state and sample; replaced by another one when something changes.
 
     Attributes:
         velocity, acceleration: from x_m[k] to v[k], and from an input to a[k].
         input: that input: "encoder": v[k]; "accelerometer": the reading; "kalman": what the velocity's filter found.
         elements: the active elements, in the order in which their forces are added.
-        motion: what elements are given; written anew at every tick.
-        declared: what the scene says of device and delay, for elements that ask.
+        motion: what elements are given; overwritten at every tick.
+        declared: what the scene says about device and delay, for elements that ask.
     """
 
     velocity: Estimator
@@ -44,7 +44,7 @@ class ControllerState(NamedTuple):
 
     Attributes:
         a_before: a of the tick before, m/s^2; 0 before the first.
-        elements: memory of every active element; None where it has none.
+        elements: memory of every active element; None for one without memory.
     """
 
     velocity: Any
@@ -53,12 +53,12 @@ class ControllerState(NamedTuple):
     elements: tuple[Any, ...]
 
 
-# A ControllerState without the names of its fields: giving them at every tick would take a fifth of its time.
+# A ControllerState without the names of its fields: naming them at every tick would take a fifth of the tick's time.
 StateTuple = tuple[Any, Any, Any, tuple[Any, ...]]
 
 
 class NoForce(Exception):
-    """An element, by its index among the active ones, that gave no force; raised from what it raised."""
+    """An element gave no force; ``index`` is its place among the active ones. Raised from what it raised."""
 
     def __init__(self, index: int) -> None:
         super().__init__(f"Element {index} gave no force.")
@@ -72,11 +72,11 @@ class NoForce(Exception):
 
 
 def demand_finite(params: ControllerParams, row: list[Any], since: int) -> None:
-    """Looks whether an element that a swap at a tick from ``since`` on has brought spoils the total of a row.
+    """Checks whether an element that a swap at or after tick ``since`` brought makes the total of a row non-finite.
 
     Raises:
-        NoForce: its force is the first in the row that is no finite number.
-        ElementError: that is so for a member of a batch.
+        NoForce: its force is the first entry of the row that is not a finite number.
+        ElementError: the total is not finite for a member of a batch.
     """
     is_finite = abs(row[-2]) < math.inf
     if is_finite is True or (is_finite is not False and is_finite.all()):
@@ -91,7 +91,7 @@ def demand_finite(params: ControllerParams, row: list[Any], since: int) -> None:
 
 
 def initial_state(params: ControllerParams, sample: Sample) -> ControllerState:
-    """Returns the state before the first tick, whose sample is given: at rest there."""
+    """Returns the state before the first tick, whose sample is given: at rest at that position."""
     velocity, x = params.velocity, sample[0]
     memory = velocity.start(x, sample)
     if params.input == "encoder":
@@ -108,7 +108,7 @@ def tick(params: ControllerParams, state: StateTuple, sample: Sample) -> tuple[S
     f_d[k] = f_wall[k] + sum of the elements' forces[k], in the order of the scene's list. The state is not changed.
 
     Raises:
-        NoForce: an element raised, or gave something that is no number.
+        NoForce: an element raised, or gave something that is not a number.
     """
     of_velocity, of_acceleration, a_before, memories = state
     x = sample[0]

@@ -1,9 +1,9 @@
 """A process in which a plugin is tried before anything depends on it: ``python -m haploop.controller.trial``.
 
-Stdin brings one JSON object a line, answered by one on what was stdout. ``source`` and ``origin`` of a file are
-answered by ``kinds``, the elements it declares, and ``brings``, whether there is more in it; ``make``, a list of kinds
-and parameters, by ``made``; what fails by
-``error``, a sentence. It ends with whoever started it, and has a limit on memory; the other side sets one on time.
+Every line of stdin is a JSON object, answered by one on the original stdout. ``source`` and ``origin`` of a file are
+answered by ``kinds``, the elements it declares, and ``brings``, whether it holds anything else; ``make``, a list of
+kinds and parameters, by ``made``; a failure by ``error``, a sentence. The process ends with the one that started it,
+and has a memory limit; the other side sets a time limit.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def main() -> None:
             reply = _load(request, kinds) if "source" in request else _make(request["make"], kinds)
         except (PluginError, ElementError) as error:
             reply = {"error": str(error)}
-        except BaseException as error:  # whatever the file raises, it is told
+        except BaseException as error:  # whatever the file raises is reported
             reply = {"error": f"The plugin {origin} cannot be used: {type(error).__name__}: {error}"}
         print(json.dumps(reply), file=answers, flush=True)
 
@@ -93,7 +93,7 @@ def _declaration(element: type[Element], origin: str) -> Reply:
 
 
 def _check_unit(unit: str, where: str) -> None:
-    """Raises PluginError where a unit is none; one that is not usual here takes a second, since pint is loaded."""
+    """Raises PluginError if ``unit`` is not a unit; one that is unusual here takes a second, since pint is loaded."""
     if unit in ("", *MEANT):
         return
     import pint
@@ -105,7 +105,7 @@ def _check_unit(unit: str, where: str) -> None:
 
 
 def _make(elements: list[tuple[str, dict[str, float]]], kinds: dict[str, type[Element]]) -> Reply:
-    """Makes each element and has it give a force at rest, out of contact and in it."""
+    """Makes each element and lets it give a force at rest, out of contact and in contact."""
     for kind, parameters in elements:
         element, _ = make_element(ElementTable(name=kind, parameters=parameters), kinds)
         memory = element.memory

@@ -20,21 +20,21 @@ from haploop.protocol.ticks import Timebase
 from haploop.protocol.walls.registry import make_wall
 from haploop.protocol.walls.wall import Wall
 
-# So long may each be at work, where it can be interrupted: in the main thread.
+# Each may take this long, where it can be interrupted: in the main thread.
 _LIMIT_S = 2.0
 _DEPTHS_M, _TIMES_S = (0.0, 1e-4), (0.0, 0.5, 3.0)
 
 
 def try_kinds(scene: Scene) -> None:
-    """Has what a scene names of a file give a number at rest, as elements do when they are tried.
+    """Makes everything that a scene names from a plugin file give a number at rest, as elements do when they are tried.
 
     Raises:
-        PluginError: one raised, or gave no finite number; the sentence has the file and the line.
+        PluginError: one raised, or gave no finite number; the message has the file and the line.
     """
     if scene.wall and is_of_file(Wall.group, scene.wall.kind):
         what = f"The wall {scene.wall.kind}"
         wall = _tried(what, "be made", lambda: make_wall(scene.wall))
-        for depth in (*_DEPTHS_M, np.array(_DEPTHS_M)):  # of the controller, and of the books
+        for depth in (*_DEPTHS_M, np.array(_DEPTHS_M)):  # as in the controller, and as in the books
             of = f"at {'an array of depths' if isinstance(depth, np.ndarray) else f'a depth of {depth:g} m'}"
             _tried(what, f"push {of}", lambda depth=depth: wall.push(depth, 0.0 * depth))
             _tried(what, f"tell what it has stored {of}", lambda depth=depth: wall.stored(depth))
@@ -64,7 +64,7 @@ def _try_force(force: HandForce) -> None:
 
 @contextmanager
 def _in_time() -> Iterator[None]:
-    """Raises TimeoutError in what goes on for longer than the limit."""
+    """Raises TimeoutError in code that runs for longer than the limit."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,4 +1,4 @@
-"""Dissipation elements: one a file, all of one shape."""
+"""Dissipation elements: one per file, all of the same form."""
 
 from haploop.controller.dissipation.element import Element, ElementError, Motion
 from haploop.controller.dissipation.registry import PluginError, load_plugin, registry

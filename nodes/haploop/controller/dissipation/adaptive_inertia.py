@@ -1,4 +1,4 @@
-"""Adaptive unidirectional inertia: takes what the damper of a passivity controller may not."""
+"""Adaptive unidirectional inertia: takes what the damper of a passivity controller may not take."""
 
 from typing import Annotated
 
@@ -13,7 +13,7 @@ class AdaptiveInertia(Element):
 
     W and alpha are those of the passivity controller (Hannaford & Ryu 2002). The rest R = W + alpha T v^2 < 0 asks for
     m_a = -R / (T |a v|), at most ``mass``, behind the gate of unidirectional inertia, v[k] a[k-1] >= 0 (Choi et al.
-    2022, eq. 9). The source announces inertia in time-domain passivity as future work; this form of it is ours.
+    2022, eq. 9). The source announces inertia in time-domain passivity as future work; the form here is ours.
     """
 
     kind = "adaptive-inertia"

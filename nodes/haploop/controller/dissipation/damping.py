@@ -7,7 +7,7 @@ from haploop.protocol.quantity import Quantity
 
 
 class Damping(Element):
-    """f = -b v[k]: dissipates while slow and smooth; held and delayed, it generates energy at high frequency."""
+    """f = -b v[k]: dissipates in slow, smooth motion; held and delayed, it generates energy at high frequency."""
 
     kind = "damping"
     linear = True

@@ -15,7 +15,7 @@ from haploop.protocol.quantity import Quantity
 
 
 class ElementError(Exception):
-    """An element that cannot be made of its parameters, or gave no force; the message names it and what it raised."""
+    """An element cannot be made from its parameters, or gave no force; the message names it and what it raised."""
 
 
 _HERE = Path(__file__).parent
@@ -23,7 +23,7 @@ _NO_PLUGIN = (_HERE.parent, Path(__file__), _HERE / "registry.py", Path(plugin_f
 
 
 def places_of(error: BaseException | None) -> list[tuple[str, int]]:
-    """Returns the files and lines of elements through which an error came, the innermost last; none of this package."""
+    """Returns the files and lines of elements that an error passed through, innermost last; none of this package."""
     return [
         (file, line)
         for file, line in plugin_file.places_of(error)
@@ -32,7 +32,7 @@ def places_of(error: BaseException | None) -> list[tuple[str, int]]:
 
 
 def place_in(kind: type[Element] | None, error: BaseException | None = None) -> str:
-    """Returns `` (file, line n)``: where in an element's file an error rose, or else where its ``force`` begins."""
+    """Returns `` (file, line n)``: where in an element's file an error arose, or else where its ``force`` begins."""
     code = getattr(getattr(kind, "force", None), "__code__", None)
     places = places_of(error) or ([(code.co_filename, code.co_firstlineno)] if code else [])
     lines = [line for file, line in places if file == places[0][0]]
@@ -49,7 +49,7 @@ def raised(error: BaseException | None, kind: type[Element] | None = None) -> st
 
 
 def as_number(force: Any) -> float:
-    """Returns an element's force as a number; TypeError where it is text, or nothing that float takes."""
+    """Returns an element's force as a number; raises TypeError if it is text, or nothing that float accepts."""
     try:
         if not isinstance(force, str | bytes):
             return float(force)
@@ -58,7 +58,7 @@ def as_number(force: Any) -> float:
     raise TypeError(f"it returned {force!r}, and a force must be a number")
 
 
-# What an element may ask for beside the motion, which it is told then.
+# What an element may ask for besides the motion.
 ASKABLE = (
     "force",
     "wall_force",
@@ -80,7 +80,7 @@ ASKABLE = (
 
 
 class Motion:
-    """Motion of the device at tick k as the controller knows it; renewed each tick, read only for elements.
+    """Motion of the device at tick k as the controller knows it; updated every tick, read-only for elements.
 
     Attributes:
         x: measured position x_m[k], m.
@@ -91,20 +91,20 @@ class Motion:
         inward: direction that leads into the wall, +1.0 or -1.0 (0.0 in a scene without a wall).
         period_s: the control period T.
 
-    What only an element is told that names it in ``asks``; energies are sampled books, E += -f[k-1] (x_m[k] - x_m[k-1])
-    in J, positive taken out of the device, since the element came into the list:
+    The following is told only to an element that names it in ``asks``. Energies are sampled books,
+    E += -f[k-1] (x_m[k] - x_m[k-1]) in J, positive if taken out of the device, since the element came into the list:
 
     Attributes:
-        force: of the wall and of all elements before this one in the list, at this tick, N.
-        wall_force, wall_stored: of the wall alone, N; what its potential holds at this penetration, J.
+        force: force of the wall and of all elements before this one in the list, at this tick, N.
+        wall_force, wall_stored: force of the wall alone, N; energy that its potential holds at this penetration, J.
         wall_position, wall_stiffness: as they are at this tick, m and N/m.
         way: x_m[k] - x_m[k-1], m; 0 at the first tick.
-        force_before, output_before, total_before: what was commanded at tick k - 1, N: of this element; with the wall
-            and all before it; in all.
-        acted: mean force held over the last period, N, as the round-trip delay of the scene has it; of commands given
-            before the element came, of jitter, loss and the actuator it knows nothing.
-        wall_energy, own_energy, output_energy, total_energy: of the wall; of this element; of it, the wall and all
-            before it; of all.
+        force_before, output_before, total_before: what was commanded at tick k - 1, N: by this element; by it, the wall
+            and all before it; in total.
+        acted: mean force held over the last period, N, according to the round-trip delay of the scene; it does not take
+            into account commands given before the element came, jitter, loss or the actuator.
+        wall_energy, own_energy, output_energy, total_energy: energy of the wall; of this element; of it, the wall and
+            all before it; of the total.
         device_mass, device_damping: as the scene declares them, kg and N s/m.
     """
 
@@ -145,7 +145,7 @@ class Motion:
 
     @property
     def into_wall(self) -> float:
-        """``inward`` by its name in plugins written before."""
+        """``inward``, by its name in older plugins."""
         return self.inward
 
 
@@ -154,28 +154,28 @@ class Motion:
 class Element(ABC):
     """Base of every dissipation element.
 
-    A subclass names its ``kind``, declares its parameters and writes ``force``, with arithmetic and ``where`` so that
-    it serves floats and arrays alike. It becomes a dataclass by itself. ``force`` is called at every tick, in contact
-    or not. A parameter is declared as ``name: Annotated[float, Quantity(unit, bounds)]``, a whole number with ``int``
-    in its place, a switch as ``bool`` and a choice as ``Literal["one", "other"]``.
+    A subclass names its ``kind``, declares its parameters and defines ``force``, with arithmetic and ``where`` so that
+    it works for floats and arrays alike. It becomes a dataclass automatically. ``force`` is called at every tick, in
+    contact or not. A parameter is declared as ``name: Annotated[float, Quantity(unit, bounds)]``, a whole number with
+    ``int`` instead of ``float``, a switch as ``bool`` and a choice as ``Literal["one", "other"]``.
 
-    An element that remembers declares its memory at the first tick as ``memory``, a number or a NamedTuple of numbers;
-    ``force(self, motion, memory)`` then returns the force and the memory of the next tick. One that keeps attributes of
-    its own, set in ``__post_init__``, works too, but one loop at a time: it has no part in batches. A swap makes a new
-    object, so either is fresh after it.
+    An element with memory declares its value at the first tick as ``memory``, a number or a NamedTuple of numbers;
+    ``force(self, motion, memory)`` then returns the force and the memory for the next tick. One that keeps attributes
+    of its own, set in ``__post_init__``, works too, but for one loop at a time: it cannot be used in batches. A swap
+    makes a new object, so that either starts fresh after it.
 
     An element that needs more than the motion names it in ``asks``: forces of wall and other elements, energies, the
-    device (``Motion`` lists them). One that limits the total returns the change that it makes, and is booked with that
-    as every other with its force.
+    device (``Motion`` lists them). One that limits the total returns the change that it makes; the books treat this
+    change as they treat the force of any other element.
 
     Attributes:
         memory: the declared memory at the first tick; None where ``force`` depends on the motion alone.
         linear: whether the force is a linear function of the motion, past ticks included; a loop of such elements
             has an exact limit of stability.
-        asks: names of what it is told beside the motion.
-        limits: whether its force is a change of what the wall and all before it give; what comes after it in the list
-            is not limited.
-        columns: unit by name of what the log shows of it beside its force, ``{"alpha": "N s/m"}``: fields of its
+        asks: names of what it is told besides the motion.
+        limits: whether its force is a change of what the wall and all elements before it give; elements after it in
+            the list are not limited.
+        columns: unit by name of what the log shows of it besides its force, ``{"alpha": "N s/m"}``: fields of its
             memory, a NamedTuple, as they are after each tick.
     """
 
@@ -194,11 +194,11 @@ class Element(ABC):
         cls.asks, cls.columns = tuple(cls.asks), MappingProxyType(dict(cls.columns))
         about = cls.__doc__
         dataclasses.dataclass(kw_only=True, eq=False)(cls)
-        cls.__doc__ = about  # a dataclass without one would tell its signature
+        cls.__doc__ = about  # a dataclass without one would show its signature
 
     @abstractmethod
     def force(self, *args: Any, **kwargs: Any) -> Any:
-        """Force of the element on the device at this tick, N, positive along +x, and the memory where it has one."""
+        """Force of the element on the device at this tick, N, positive along +x, and the memory if it has one."""
 
     def values(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
@@ -208,7 +208,7 @@ class Element(ABC):
         """Returns name -> (quantity, default or ``dataclasses.MISSING``) of every declared parameter.
 
         Raises:
-            TypeError: a parameter is declared as none of the forms there are.
+            TypeError: a parameter is declared in none of the allowed forms.
         """
         return dict(_parameters(cls))
 

@@ -1,4 +1,4 @@
-"""Force bounding: never more force than the device's own damping can answer for."""
+"""Force bounding: never more force than the device's own damping can account for."""
 
 from typing import Annotated, Any
 
@@ -8,11 +8,11 @@ from haploop.protocol.quantity import Quantity
 
 
 class ForceBounding(Element):
-    """Change of the force f_e of the wall and of all before it to |f| <= sqrt(4 b E / T) (Kim & Ryu 2010).
+    """Limits the force f_e of the wall and of all elements before it to |f| <= sqrt(4 b E / T) (Kim & Ryu 2010).
 
-    E[k] = E[k-1] + (b/T) (x_m[k] - x_m[k-1])^2 - f[k-1] (x_m[k] - x_m[k-1]), of the device's own damping b, or the
-    ``share`` of it that is counted on. E + (b/T) dx^2 - f dx >= 0 for every way dx just if the bound holds: without
-    delay, and while it acts at every tick, E is never negative.
+    E[k] = E[k-1] + (b/T) (x_m[k] - x_m[k-1])^2 - f[k-1] (x_m[k] - x_m[k-1]), with the device's own damping b, or the
+    ``share`` of it that is relied on. E + (b/T) dx^2 - f dx >= 0 for every displacement dx exactly if the bound holds:
+    without delay, and while the element acts at every tick, E is never negative.
     """
 
     kind = "force-bounding"

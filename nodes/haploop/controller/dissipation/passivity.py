@@ -1,4 +1,4 @@
-"""Adaptive damping: a passivity observer, and the damper that it asks to take what is missing."""
+"""Adaptive damping: a passivity observer, and the damper that takes the energy which it finds missing."""
 
 from typing import Annotated, Any
 
@@ -10,7 +10,7 @@ from haploop.protocol.quantity import Quantity
 def taken_by_damper(energy: Any, damping: Any, motion: Motion) -> Any:
     """Returns the force -alpha v, with alpha = -W / (T v^2) at most ``damping`` where the energy W < 0, else 0.
 
-    T v is the way since the last sample, which is not 0 where the damper acts; so -alpha v = W / (T v).
+    T v is the displacement since the last sample, which is not 0 where the damper acts; so -alpha v = W / (T v).
     """
     moves = motion.way != 0.0
     wanted = where(energy < 0.0, energy, 0.0) / where(moves, motion.way, 1.0)
@@ -20,10 +20,10 @@ def taken_by_damper(energy: Any, damping: Any, motion: Motion) -> Any:
 class PassivityController(Element):
     """f = -alpha v, alpha = -W / (T v^2), at most its damping, where W < 0 and v != 0; else 0 (Hannaford & Ryu 2002).
 
-    W[k] = W[k-1] - f_out[k-1] (x_m[k] - x_m[k-1]), of f_out: the force of the wall, of all before it in the list and
-    its own; v = (x_m[k] - x_m[k-1]) / T. The source books f[k] v[k]; this is what a held force does. The next sample
-    takes -W v[k+1] / v[k]: all that is missing where the speed has not fallen, less where it has; turned round, it
-    gives.
+    W[k] = W[k-1] - f_out[k-1] (x_m[k] - x_m[k-1]), where f_out is the force of the wall, of all elements before it in
+    the list and its own; v = (x_m[k] - x_m[k-1]) / T. The source books f[k] v[k]; the form here is the work of a held
+    force. By the next sample the damper takes -W v[k+1] / v[k]: all that is missing if the speed has not fallen, less
+    if it has; if the device has turned round, the damper gives energy.
     """
 
     kind = "passivity-controller"
@@ -35,9 +35,9 @@ class PassivityController(Element):
 
 
 class PassivityControllerReset(Element):
-    """A passivity controller that books every contact by itself: W = 0 at the last tick before it.
+    """A passivity controller that books every contact separately: W = 0 at the last tick before it.
 
-    So what earlier contacts took is no credit for this one; what they still owe is let off.
+    Thus what earlier contacts took is no credit for this one, and what they still owe is dropped.
     """
 
     kind = "passivity-controller-reset"
@@ -54,7 +54,7 @@ class PassivityControllerReference(Element):
     """A passivity controller that keeps W above V(p), what the wall's potential holds at the penetration p.
 
     After Ryu, Preusche, Hannaford & Hirzinger 2005 (reference energy following): it acts as soon as the sampled wall
-    takes less than is stored in an ideal one, K p^2 / 2 of a spring, also on the way in.
+    takes less energy than an ideal one stores, K p^2 / 2 for a spring, also on the way in.
     """
 
     kind = "passivity-controller-reference"

@@ -1,4 +1,4 @@
-"""Finding the kinds of element: installed under the entry-point group, or in a file named at launch."""
+"""Finds the kinds of element: installed under the entry-point group, or in a file named at launch."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from haploop.protocol.installed import Brought, entry_points_of, not_loaded
 from haploop.protocol.plugin_file import ELEMENTS, PluginError, bring_file, bring_source
 from haploop.protocol.quantity import Quantity
 
-# Books are called by the kind, numbered from the second one of a kind on; a dot ends the name of an account.
+# Books are named after the kind, numbered from the second one of a kind on; a dot ends the name of an account.
 _KIND = re.compile(r"(?!.*-\d+$)\w[\w-]*")
 _TAKEN = ("wall", "earlier", "none")
 
@@ -28,10 +28,10 @@ def installed() -> dict[str, str]:
 def registry(
     plugin_files: list[Path] | None = None, places: Mapping[str, str] | None = None
 ) -> dict[str, type[Element]]:
-    """Returns every kind by name: the installed ones, then those of ``plugin_files``, which win.
+    """Returns every kind by name: the installed ones, then those of ``plugin_files``, which take precedence.
 
     Args:
-        places: what ``installed`` returned elsewhere; to look for it anew reads a file of every package there is.
+        places: what ``installed`` returned elsewhere; another search would read a file of every installed package.
 
     Raises:
         PluginError: an entry point or a file does not load, or holds no element.
@@ -48,7 +48,7 @@ def registry(
 
 
 def load_plugin(path: Path) -> dict[str, type[Element]]:
-    """Returns the elements a Python file defines, by kind, and makes known what else it brings, as ``bring_file`` does.
+    """Returns the elements a Python file defines, by kind, and registers what else it brings, as ``bring_file`` does.
 
     Raises:
         PluginError: the file cannot be read or run, or defines nothing usable.
@@ -57,7 +57,7 @@ def load_plugin(path: Path) -> dict[str, type[Element]]:
 
 
 def load_source(source: str, origin: str) -> dict[str, type[Element]]:
-    """Does with the text of a file what ``load_plugin`` does with the file, ``origin``."""
+    """Does with the text of the file ``origin`` what ``load_plugin`` does with a file."""
     return _elements_of(bring_source(source, origin), origin)
 
 
@@ -67,10 +67,10 @@ def _elements_of(found: Brought, origin: str) -> dict[str, type[Element]]:
 
 
 def checked(element: object, origin: str) -> type[Element]:
-    """Returns an element that has a kind, a force and well declared parameters.
+    """Returns ``element`` if it is one, with a kind, a force and properly declared parameters.
 
     Raises:
-        PluginError: it is none; ``origin`` says where it came from.
+        PluginError: it is not; ``origin`` says where it came from.
     """
     if not (inspect.isclass(element) and issubclass(element, Element)):
         raise PluginError(f"{origin} must name a class derived from Element, but gives {element!r}.")
@@ -105,7 +105,7 @@ def checked(element: object, origin: str) -> type[Element]:
 
 
 def _complaint(quantity: Quantity, default: object) -> str | None:
-    """Returns why a default cannot be the parameter's value, None where it can."""
+    """Returns why a default cannot be the parameter's value, None if it can."""
     if quantity.choices:
         is_one = any(choice.__class__ is default.__class__ and choice == default for choice in quantity.choices)
         return None if is_one else f"must be {' or '.join(map(quantity.text, quantity.choices))}"

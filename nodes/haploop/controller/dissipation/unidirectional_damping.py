@@ -1,4 +1,4 @@
-"""Virtual damping that resists only the way in."""
+"""Virtual damping that resists only motion into the wall."""
 
 from typing import Annotated
 

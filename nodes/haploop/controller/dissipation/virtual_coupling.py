@@ -1,4 +1,4 @@
-"""Virtual coupling: the wall is touched by a virtual tool, which a spring and damper hold to the device."""
+"""Virtual coupling: a virtual tool touches the wall, and a spring and damper couple it to the device."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -8,9 +8,9 @@ from haploop.protocol.quantity import Quantity
 
 
 class Tool(NamedTuple):
-    """State of the tool: its place, m; its velocity, m/s; x_m when it last moved, m; ticks until it does next.
+    """State of the tool: its position, m; its velocity, m/s; x_m when it last moved, m; ticks until it moves next.
 
-    -1 ticks: it is not there yet, and comes where the device is.
+    -1 ticks: it does not exist yet, and will appear where the device is.
     """
 
     y: Any
@@ -20,22 +20,22 @@ class Tool(NamedTuple):
 
 
 class VirtualCoupling(Element):
-    """Force f_e turned into -Kc (x_m - y) - Bc (dx_m / T - u), of a coupling to an implicit virtual tool.
+    """Replaces the force f_e by -Kc (x_m - y) - Bc (dx_m / T - u), a coupling to an implicit virtual tool.
 
-    Every N ticks comes a step of the world, S = N T long. In it the tool (y1, u1 before it) moves by
-    m_v (u - u1) / S = Kc (x_m - y) + Bc ((x_m - x1) / S - u) + F(y), y = y1 + S u, x1 the x_m of the step before, F the
-    wall's force on it, solved for at once; until the next step it rests. N = 1 is the coupling of Colgate, Stanley &
-    Brown 1995 and Adams & Hannaford 1999. With every passive world of convex potential the loop without delay is stable
-    if the device's b > Kc T / 2 + Bc, whatever N. Derived for N > 1, with v[k] the mean velocity of a period and V that
-    of the N periods from a step on, V1 before it:
-        - a step, at a given x_m, does not raise the energy of coupling, tool and world by way of Kc and F,
-        - the held force of Kc takes no less between steps than the change of Kc (x_m - y)^2 / 2 less
-          Kc T / 2 times the sum of v[k]^2 T, as y rests;
+    Every N ticks the world makes a step of length S = N T. In it the tool (y1, u1 before it) moves by
+    m_v (u - u1) / S = Kc (x_m - y) + Bc ((x_m - x1) / S - u) + F(y), y = y1 + S u, with x1 the x_m of the step before
+    and F the wall's force on the tool, solved simultaneously; until the next step the tool rests. N = 1 is the coupling
+    of Colgate, Stanley & Brown 1995 and Adams & Hannaford 1999. With every passive world of convex potential the loop
+    without delay is stable if the device's b > Kc T / 2 + Bc, whatever N. Derivation for N > 1, with v[k] the mean
+    velocity of a period, V that of the N periods from a step on, and V1 that before it:
+        - a step, at a given x_m, does not raise the energy of coupling, tool and world through Kc and F;
+        - the held force of Kc takes no less between steps than the change of Kc (x_m - y)^2 / 2 minus
+          Kc T / 2 times the sum of v[k]^2 T, since y rests;
         - Bc takes Bc T sum v[k] v[k+1] - Bc S sum (u (V1 + V) - u^2), and u (V1 + V) - u^2 <= ((V1 + V) / 2)^2, so
           that at most Bc sum v[k]^2 T is missing.
     b takes at least b sum v[k]^2 T. The price of N: in free motion the resting tool drags like damping Kc (S - T) / 2.
 
-    It is meant to act always; what elements before it give is left out.
+    It is meant to act always; the forces of elements before it are left out.
     """
 
     kind = "virtual-coupling"

@@ -1,4 +1,4 @@
-"""Estimators as parameters alone: their memory is handed in and out, so one object serves floats and arrays."""
+"""Estimators as parameters alone: their memory is passed in and out, so that one object serves floats and arrays."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Estimator(ABC):
     written with arithmetic and ``where``, so that it serves floats, NumPy and JAX alike.
 
     Attributes:
-        name: what ``velocity.estimator`` and ``acceleration.estimator`` say to ask for it.
+        name: value of ``velocity.estimator`` or ``acceleration.estimator`` that asks for it.
         does: what the estimate is, in one phrase.
         tables: the tables of the scene that may name it.
-        needs, takes: keys of the scene's table that it must have, and that it may have besides.
-        keys: declaration of those that are its own; the scene declares the keys that come with haploop.
+        needs, takes: keys that the scene's table must have, and that it may have in addition.
+        keys: declarations of its own keys; the scene declares the keys that come with haploop.
         needs_without: key that ``[velocity]`` must have too unless the scene has one of these tables to take the value
             from; ``[acceleration]`` must always have it.
         linear: whether the estimate is a linear function of the samples.
@@ -44,7 +44,7 @@ class Estimator(ABC):
 
     @classmethod
     def parameters(cls) -> dict[str, tuple[Quantity, Any]]:
-        """Returns the keys of its own by name: the declaration, and that there is no default."""
+        """Returns its own keys by name: the declaration, and that there is no default."""
         return {name: (quantity, MISSING) for name, quantity in cls.keys.items()}
 
     @classmethod
@@ -122,8 +122,8 @@ class Unchanged(Estimator):
 class LowPass(Estimator):
     """First-order low-pass y += gain (u - y), gain = 1 - exp(-2 pi fc T), of another estimator's estimate.
 
-    y starts at the first one. Memory: (that of the other, y). Delays slow signals by T / gain - T, about 1 / (2 pi fc);
-    white noise of standard deviation sigma in u becomes sqrt(gain / (2 - gain)) sigma.
+    y starts at the first estimate. Memory: (that of the other, y). Delays slow signals by T / gain - T, about
+    1 / (2 pi fc); white noise of standard deviation sigma in u becomes sqrt(gain / (2 - gain)) sigma.
     """
 
     name: ClassVar[str] = "low-pass"
@@ -133,7 +133,7 @@ class LowPass(Estimator):
 
     @classmethod
     def from_scene(cls, scene: Scene, of: str, period_s: float) -> LowPass:
-        """Raises TypeError: it is made of another."""
+        """Raises TypeError: a low-pass is made over another estimator."""
         raise TypeError("A low-pass is made over another estimator.")
 
     def start(self, u: Any, sample: Sample) -> Any:

@@ -1,4 +1,4 @@
-"""The register of estimators, and the making of those of v[k] and a[k] that a scene names."""
+"""The register of estimators; makes those of v[k] and a[k] that a scene names."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _REGISTER: Register[Estimator] = Register("estimator", Estimator.group, ESTIMATO
 
 
 def estimator_class(name: str) -> type[Estimator]:
-    """Returns the estimator of a name; UnknownKind for none."""
+    """Returns the estimator with this name; raises UnknownKind if there is none."""
     return _REGISTER.find(name)
 
 
@@ -34,11 +34,11 @@ def estimators_for(table: str) -> dict[str, type[Estimator]]:
 
 
 def make_estimators(scene: Scene, period_s: float) -> tuple[Estimator, Estimator, str]:
-    """Makes those that a scene's ``[velocity]`` and ``[acceleration]`` name, for the control period T.
+    """Makes the estimators that a scene's ``[velocity]`` and ``[acceleration]`` name, for the control period T.
 
     Returns:
-        What estimates v of x_m, what estimates a of its input, and that input: "encoder": v as it is filtered;
-        "accelerometer": the reading; "kalman": what the velocity's filter found.
+        The estimator of v from x_m, that of a from its input, and that input: "encoder": v as filtered;
+        "accelerometer": the reading; "kalman": the acceleration that the velocity's filter found.
     """
     acceleration = scene.acceleration or Acceleration()
     raw = _make(scene, "acceleration", period_s) if acceleration.source == "encoder" else Unchanged()

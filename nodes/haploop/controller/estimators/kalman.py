@@ -6,15 +6,15 @@ Between ticks the model is x''' = w, E[w(t) w(s)] = S delta(t - s), S = ``jerk_d
     | v | [k+1] =| 0  1  T     | | v | [k] + noise, Q = S  | T^4/8   T^3/3  T^2/2 |
     | a |        | 0  0  1     | | a |                     | T^3/6   T^2/2  T     |
 
-Measured are x with white noise of standard deviation sigma and, where the accelerometer is asked, a with its own
+Measured are x with white noise of standard deviation sigma and, if the accelerometer is used, a with its own noise
 (Bar-Shalom, Li, Kirubarajan 2001, section 6.2; Belanger et al. 1998 for encoders).
 
 With w0 = (S / (sigma^2 T))^(1/6) and w0 T << 1 the filter of positions alone has the poles of a third-order Butterworth
 low-pass of corner w0 rad/s, and errors, jerk and noise together, of sqrt(3 w0^3 T) sigma in v and sqrt(2 w0^5 T) sigma
-in a. So a wanted corner is had by ``jerk_density`` = w0^3 sigma sqrt(T). Constant acceleration is followed without
-error or delay; at a constant jerk a comes late by g_v / g_a - T / 2, g the gains: by 2 / w0 when w0 T << 1.
-Rounding is not white where the device hardly moves, nor is band-limited noise: the filter is then no longer the best,
-but as stable. An accelerometer's bias, delay and bandwidth are not in the model.
+in a. A desired corner thus needs ``jerk_density`` = w0^3 sigma sqrt(T). Constant acceleration is followed without
+error or delay; at a constant jerk a is late by g_v / g_a - T / 2, g the gains: by 2 / w0 when w0 T << 1.
+Rounding is not white where the device hardly moves, and band-limited noise is not white either: the filter is then no
+longer the best, but just as stable. An accelerometer's bias, delay and bandwidth are not in the model.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     import numpy as np
 
 Memory = tuple[Any, Any, Any]
-# Decimals of a gain times the least surprise it meets: LAPACK's last bits, which differ between machines, lie beyond.
+# Decimals kept of a gain times the least surprise it meets: LAPACK's last bits, which differ between machines, lie
+# beyond.
 _DECIMALS = 12
 
 
@@ -42,7 +43,7 @@ _DECIMALS = 12
 class Kalman(Estimator):
     """The velocity from positions alone; ``acceleration`` gives the a found with it.
 
-    The first sample is where the prediction starts, at rest, so that v[0] = a[0] = 0.
+    The prediction starts at the first sample, at rest, so that v[0] = a[0] = 0.
 
     Memory: (x, v as the model predicts them at the next tick; a, which it holds until then).
 
@@ -63,7 +64,7 @@ class Kalman(Estimator):
 
     @classmethod
     def from_scene(cls, scene: Scene, of: str, period_s: float) -> Kalman:
-        """Makes the filter of a scene's ``[velocity]`` table, fused with the accelerometer where that is asked."""
+        """Makes the filter of a scene's ``[velocity]`` table, fused with the accelerometer if that is asked for."""
         noises = assumed_noises(scene, period_s).values()
         density = (scene.velocity or Velocity()).jerk_density
         gain = each(lambda jerk, *noises: steady_state(jerk, list(noises), period_s)[0], density, *noises)
@@ -107,7 +108,7 @@ class FusedKalman(Kalman):
 
 
 def assumed_noises(scene: Scene, period_s: float) -> dict[str, float]:
-    """Returns the standard deviations that the filter of a scene counts on, by their keys in ``[velocity]``."""
+    """Returns the standard deviations that the filter of a scene assumes, by their keys in ``[velocity]``."""
     noises = {"measurement_noise": position_noise_m(scene)}
     if scene.velocity and scene.velocity.accelerometer:
         given = scene.velocity.accelerometer_noise
@@ -125,11 +126,11 @@ def steady_state(jerk_density: float, noises: list[float], period_s: float) -> t
     """Returns the gain, shape (3, m), and the covariance of the estimate's error, shape (3, 3), both SI.
 
     P = A (P - P H' (H P H' + R)^-1 H P) A' + Q, gain = P H' (H P H' + R)^-1, solved with sigma as the unit of length
-    and 1 / w0 or T, whichever is longer, as that of time: then no number is far from 1, however slow the filter.
+    and 1 / w0 or T, whichever is longer, as that of time; no number is then far from 1, however slow the filter.
 
     Args:
         jerk_density: root of the jerk's density S, m/s^3/Hz^0.5, within ``jerk_density_limits``.
-        noises: standard deviation of the position, m, above 0, and where it is measured of the acceleration, m/s^2.
+        noises: standard deviation of the position, m, above 0, and, if it is measured, that of the acceleration, m/s^2.
     """
     import numpy as np
     from scipy.linalg import solve_discrete_are
@@ -143,7 +144,7 @@ def steady_state(jerk_density: float, noises: list[float], period_s: float) -> t
     noise = np.diag(deviation**2)
     predicted = solve_discrete_are(step.T, reads.T, process, noise)
     gain = np.linalg.solve(reads @ predicted @ reads.T + noise, reads @ predicted).T
-    # Joseph's form: a sum of squares, so that no variance is below 0 where the filter takes nearly all of one away.
+    # Joseph's form: a sum of squares, so that no variance is below 0 where the filter removes nearly all of it.
     kept = np.eye(3) - gain @ reads
     estimated = kept @ predicted @ kept.T + gain @ noise @ gain.T
     surprise = np.maximum(deviation, 1.0)
@@ -161,7 +162,7 @@ def _model(T: float, S: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def position_noise_m(scene: Scene) -> float:
-    """Returns sigma: what ``[velocity]`` says, or that of rounding (q / sqrt(12)) and noise together."""
+    """Returns sigma: the one that ``[velocity]`` gives, or that of rounding (q / sqrt(12)) and noise together."""
     if scene.velocity and scene.velocity.measurement_noise is not None:
         return scene.velocity.measurement_noise
     rounding = (scene.encoder.resolution if scene.encoder else 0.0) / math.sqrt(12.0)
@@ -171,7 +172,7 @@ def position_noise_m(scene: Scene) -> float:
 def _accelerometer_noise_m_s2(scene: Scene, period_s: float) -> float:
     """Returns the deviation of the accelerometer's white noise through its first-order bandwidth, and of its rounding.
 
-    The noise of density n is n sqrt(pi B / 2) behind a corner at B Hz, n sqrt(1 / (2 T)) when sampled as it is.
+    The deviation of noise of density n is n sqrt(pi B / 2) behind a corner at B Hz, n sqrt(1 / (2 T)) if unfiltered.
     """
     table = scene.accelerometer or Accelerometer()
     band_Hz = 0.5 / period_s if table.bandwidth is None else math.pi / 2.0 * table.bandwidth

@@ -1,4 +1,4 @@
-"""Differences over a window of ticks: fixed, and as long as the signal is a straight line."""
+"""Differences over a window of ticks: of fixed length, or as long as the signal is a straight line."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from haploop.protocol.scene.scene import Scene
 
 @dataclass(frozen=True)
 class WindowDifference(Estimator):
-    """(u[k] - u[k-w]) / (w T) with w = ``ticks``, over the ticks there are as long as they are fewer; 0 at the first.
+    """(u[k] - u[k-w]) / (w T) with w = ``ticks``, or over all ticks so far while they are fewer; 0 at the first.
 
     Exact for a constant rate. Delays slow signals by w T / 2, as every moving average of w values does. White noise of
-    standard deviation sigma in u becomes sqrt(2) sigma / (w T), and a rounding to q steps of q / (w T)
+    standard deviation sigma in u becomes sqrt(2) sigma / (w T), and rounding to q becomes steps of q / (w T)
     (Brown, Schneider, Mulligan 1992).
 
-    Memory: (the last w inputs, the newest first, the first input in place of those that never were; ticks since the
-    first, at most w).
+    Memory: (the last w inputs, the newest first, the first input in place of those before it; ticks since the first,
+    at most w).
     """
 
     name: ClassVar[str] = "window"
@@ -44,7 +44,7 @@ class WindowDifference(Estimator):
         return (recent, age + (age < self.ticks)), rate
 
 
-# A deviation of just the bound, which quantised signals make often, counts as within it however it is rounded.
+# A deviation of exactly the bound, frequent in quantised signals, counts as within it, however it is rounded.
 _ROUNDING = 1e-6
 
 
@@ -57,12 +57,12 @@ class EndFit(Estimator):
 
     Where the rate is constant and the noise stays within +-bound / 2 every window fits, so that the error is at
     most bound / (n T) with n = ``ticks``: rounding to q is such noise, hence the default bound of one count.
-    Delays by i T / 2, white noise sigma becomes sqrt(2) sigma / (i T), each with the i of the moment. Where the rate
-    steps, noise apart, by more than 2 bound / T the window is 1 in the tick after, 2 in the next, and grows with the
-    new rate. A bound below the noise leaves little but window 1.
+    Delays by i T / 2; white noise sigma becomes sqrt(2) sigma / (i T), each with the current i. Where the rate steps,
+    noise apart, by more than 2 bound / T, the window is 1 in the tick after, 2 in the next, and grows with the new
+    rate. A bound below the noise leaves little more than window 1.
 
-    Memory: the last n inputs, the newest first; no number (NaN) in place of those that never were, so that no window
-    that holds one fits.
+    Memory: the last n inputs, the newest first; NaN in place of those before the first, so that no window that holds
+    one fits.
     """
 
     name: ClassVar[str] = "foaw"
@@ -77,7 +77,7 @@ class EndFit(Estimator):
 
     @classmethod
     def from_scene(cls, scene: Scene, of: str, period_s: float) -> EndFit:
-        """Makes the one that the scene's table asks for; a velocity's bound is one count unless it is given."""
+        """Makes the estimator that the scene's table asks for; a velocity's bound is one count unless it is given."""
         table = scene.estimate(of)
         count = scene.encoder.resolution if scene.encoder and of == "velocity" else 0.0
         bound = count if table.bound is None else table.bound
@@ -100,10 +100,10 @@ class EndFit(Estimator):
 
 @dataclass(frozen=True)
 class BestFit(EndFit):
-    """The slope of least squares over the window that ``EndFit`` finds (Janabi-Sharifi et al. 2000, best-fit-FOAW).
+    """The least-squares slope over the window that ``EndFit`` finds (Janabi-Sharifi et al. 2000, best-fit-FOAW).
 
     With r[j] = u[k] - u[k-j]: 6 (sum of (2 j - i) r[j], j = 1..i) / (T i (i + 1) (i + 2)). Delays by i T / 2 as the
-    end-fit does; white noise sigma becomes sqrt(12 / (i (i + 1) (i + 2))) sigma / T, less than there from i = 3 on.
+    end-fit does; white noise sigma becomes sqrt(12 / (i (i + 1) (i + 2))) sigma / T, less than the end-fit from i = 3 on.
     (The authors' best fit also chooses its window by its own line; here one window serves both.)
     """
 
@@ -121,7 +121,7 @@ def _windows(u: Any, recent: tuple[Any, ...], bound: Any) -> Iterator[tuple[int,
     """Yields every window i = 1, 2, ... with its rise u[k] - u[k-i], and whether its line fits.
 
     A line through u[k] passes within the bound of u[k-j] when its rise per tick is within (u[k] - u[k-j] +- bound) / j,
-    so each sample narrows what the longer windows may be. All windows are tried: a longer one may fit where a shorter
+    so each sample narrows the range for the longer windows. All windows are tried: a longer one may fit where a shorter
     one does not, and the members of a batch each have their own longest.
     """
     reach = bound * (1.0 + _ROUNDING)

@@ -1,4 +1,4 @@
-"""The acceleration that an accelerometer on a body of the chain senses: under which forces, with which bandwidth and delay."""
+"""The acceleration sensed by an accelerometer on a body of the chain: its forces, bandwidth and delay."""
 
 from __future__ import annotations
 
