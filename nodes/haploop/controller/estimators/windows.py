@@ -103,7 +103,8 @@ class BestFit(EndFit):
     """The least-squares slope over the window that ``EndFit`` finds (Janabi-Sharifi et al. 2000, best-fit-FOAW).
 
     With r[j] = u[k] - u[k-j]: 6 (sum of (2 j - i) r[j], j = 1..i) / (T i (i + 1) (i + 2)). Delays by i T / 2 as the
-    end-fit does; white noise sigma becomes sqrt(12 / (i (i + 1) (i + 2))) sigma / T, less than the end-fit from i = 3 on.
+    end-fit does; white noise sigma becomes sqrt(12 / (i (i + 1) (i + 2))) sigma / T, less than with the end-fit from
+    i = 3 on.
     (The authors' best fit also chooses its window by its own line; here one window serves both.)
     """
 

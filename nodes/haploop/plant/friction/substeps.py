@@ -138,8 +138,8 @@ def solve_step(
     within it, the piece is halved, until the switch lies within h / 2^32; there the mode changes, and v is set to
     exactly 0.0. The kinetic energy that this removes, of the order of 1e-20 of what moves, is heat of friction.
     A search for a switch ends with one: if at its end the pieces say that the mode still holds, and the one long piece
-    said that it does not, they differ by rounding, and v, or the force that friction could still hold, is no more than
-    that. (With a Stribeck velocity long pieces have larger errors: a slip then continues.) A slip that ``creeps``
+    said that it does not, the two differ by rounding, and v, or the force that friction could still hold, is no more
+    than that. (With a Stribeck velocity long pieces have larger errors: a slip then continues.) A slip that ``creeps``
     stops, too, where friction holds the other forces.
     With a Stribeck velocity every piece has the friction of the speed predicted for its middle: second order in h.
     A few states tell whether the mode holds at the end of a piece, so that only a piece that is kept is moved as a
