@@ -212,5 +212,5 @@ def motion_integrals(mass: float, damping: float, stiffness: float, step_s: floa
 
 
 def real_for(damping_rate: float, step_s: float) -> type[np.floating]:
-    """Returns the float type in which to sum forms of rates; their terms cancel in the ratio of step to time constant."""
+    """Returns the float type in which to sum forms of rates; terms cancel in the ratio of step to time constant."""
     return np.longdouble if damping_rate * step_s > 100.0 else np.float64
