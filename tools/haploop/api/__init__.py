@@ -1,22 +1,22 @@
 """The front door for Python: what the command line does, as functions that return arrays and numbers.
 
-A wall is run, and another one steered while it runs:
+This runs a scene, then steers a second run of it:
 
     from haploop.api import load, run, start
 
     scene = load("demo", {"wall.stiffness": "3 N/mm"})      # a file of yours, or a name that `haploop scenes` lists
-    result = run(scene)                                     # in this process, in memory; the bits of `haploop run`
+    result = run(scene)                                     # in this process, in memory; same bits as `haploop run`
     result.verdict, result.provisos, result.quantity("window.oscillation_m")
     result["/plant"]["x"], result["/plant"].units["x"]      # a NumPy array, and its unit
 
-    with start(scene, paused=True) as loop:                 # plant, controller and logger as processes, steered
+    with start(scene, paused=True) as loop:                 # starts plant, controller and logger as processes
         loop.step(1000)
         loop.swap("damping", damping="5 N s/m")
         steadied = loop.finish()
 
-Values are numbers in SI units, text with a unit or quantities of pint; a wrong name is told with the nearest. Nothing
-is imported before it is first used. A program that sweeps, advises or compares starts workers, which import it
-again: begin it with ``if __name__ == "__main__":``, as multiprocessing asks.
+Values are numbers in SI units, text with a unit, or pint quantities; the error for a wrong name suggests the nearest
+one. Nothing is imported before it is first used. A program that sweeps, advises or compares starts worker processes,
+which import that program again: guard its code with ``if __name__ == "__main__":``, as multiprocessing requires.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A running loop in Python's hands: its processes started, watched, swapped, set, stepped and ended."""
+"""Control of a running loop from Python: start, watch, swap elements, set values, step and end it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from haploop.logger.summary import read as read_summary
 from haploop.protocol.quantity import Quantity
 
 _LOOK_S, _ENDS_WITHIN_S, _TOLD = 0.01, 20.0, "told.txt"
-# Simulated seconds per second of a run that is to stand still at its start: no tick after the first is due.
+# Pace, in simulated seconds per second, of a run that is to stand still at its start: no tick after the first is due.
 _STANDING = 1e-6
 _PAUSED = (
     "The run {0} is paused at tick {1} and comes to no end by itself: resume() lets it go on, finish() does, and waits "
@@ -42,7 +42,7 @@ _TIME = Number(Quantity("s", at_least=0, about="time"))
 
 
 def _seconds(at: Any) -> float | None:
-    """Returns a time given in s, as text with its unit or as a quantity of pint; None for none."""
+    """Returns a time in s, given in s, as text with its unit or as a pint quantity; None if there is none."""
     return None if at is None else _TIME.read(plain(at))
 
 
@@ -54,11 +54,11 @@ class _Started(NamedTuple):
     keeps: bool
 
     def told(self) -> str:
-        """Returns what the run said of itself."""
+        """Returns what the run wrote to stderr."""
         return Path(self.scratch.name, _TOLD).read_text(encoding="utf-8").strip()
 
     def end(self) -> None:
-        """Ends the run in order if it still goes on, or at once where it takes too long."""
+        """Ends the run in order if it is still going, and kills it if that takes too long."""
         if self.process.poll() is None:
             self.process.terminate()
             try:
@@ -72,13 +72,13 @@ class _Started(NamedTuple):
 def start(
     scene: LoadedScene | str | Path, out: str | Path | None = None, *, pace: float = math.inf, paused: bool = False
 ) -> LiveLoop:
-    """Starts a scene as processes, which other terminals and the live page can watch and steer, too.
+    """Starts a scene as processes, which other terminals and the live page can also watch and steer.
 
     Args:
         scene: a loaded scene, or the path or name of one.
-        out: directory for log, summary and scene, new or empty; when None, nothing is left of it.
-        pace: simulated seconds per second; infinite for as fast as it goes, 1 for real time.
-        paused: stand still at the first tick, until ``step`` or ``resume``. What is changed between steps takes effect
+        out: directory for log, summary and scene, new or empty; when None, no files are kept.
+        pace: simulated seconds per second; infinite for as fast as possible, 1 for real time.
+        paused: stand still at the first tick, until ``step`` or ``resume``. A change made between steps takes effect
             at the same tick every time, and gives the same bits.
 
     Raises:
@@ -93,7 +93,7 @@ def start(
     words += ["--pace", repr(_STANDING) if paused else "free" if math.isinf(pace) else repr(float(pace))]
     words += [word for plugin in scene.plugins for word in ("--plugin", str(plugin))]
     with Path(scratch.name, _TOLD).open("w", encoding="utf-8") as errors:
-        # In a group of its own: Ctrl-C is for this program, which ends the run in order.
+        # In a process group of its own: Ctrl-C goes to this program alone, which ends the run in order.
         process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=errors, process_group=0)
     started = _Started(process, scratch, out is not None)
     found: list[LiveRun] = []
@@ -108,7 +108,7 @@ def start(
         why = started.told()
         started.end()
         raise RunFailed(why)
-    # A short one may be over before it was seen.
+    # A short run may be over before it was found.
     run = found[0] if found else LiveRun("", None, process.pid, "", scene["title"], str(directory))
     loop = LiveLoop(run, scene, started)
     if paused:
@@ -118,14 +118,14 @@ def start(
 
 
 def attach(run_id: str | None = None, *, at: str | None = None, keys: str | Path | None = None) -> LiveLoop:
-    """Returns the handle of a run that was started elsewhere, as by ``haploop run``; leaving it does not end it.
+    """Returns a handle on a run started elsewhere, such as by ``haploop run``; closing the handle does not end the run.
 
     Args:
-        run_id: its id or the beginning of it; the only run there is when None.
+        run_id: its id or the beginning of it; when None, the only run there is.
         at: ``"HOST:PORT"`` of a run on another host; ``keys`` is a directory with a copy of its keys.
 
     Raises:
-        RunNotFound: not one run fits, or it does not answer.
+        RunNotFound: no run, or more than one, fits, or the run does not answer.
     """
     from haploop.protocol.transport.addresses import address_to_reach
 
@@ -134,13 +134,13 @@ def attach(run_id: str | None = None, *, at: str | None = None, keys: str | Path
 
 
 class LiveLoop:
-    """A live run. As a context manager it ends the run that it started, if that still goes on.
+    """A live run. As a context manager it ends the run that it started, if that is still going.
 
-    Its methods raise CommandRefused, whose message says why, where the run does not do what is asked, and RunNotFound
-    where it has ended.
+    Its methods raise CommandRefused, with the reason in the message, if the run refuses a command, and RunNotFound if
+    it has ended.
 
     Attributes:
-        id: by which ``haploop --run ID`` finds it.
+        id: the ID by which ``--run ID`` of a command finds the run.
     """
 
     def __init__(self, run: LiveRun, scene: LoadedScene | None = None, started: _Started | None = None) -> None:
@@ -161,17 +161,17 @@ class LiveLoop:
         return ask(self._run, verb, **arguments)[1]
 
     def status(self) -> dict[str, Any]:
-        """Returns tick, end, pace, whether it is paused, and every node, as ``haploop status --json``."""
+        """Returns tick, end, pace, whether it is paused, and every node, as ``haploop status --json`` does."""
         return self._ask("status")
 
     def set(self, values: Mapping[str, Any], at: Any = None) -> int:
         """Changes numbers, ``{"wall.stiffness": "0.4 N/mm"}``, at once or at a simulated time; returns the tick.
 
-        The time is in s or text with its unit. A number that hardly any loop has, as one in another unit than was
-        meant, is told as a ``UserWarning``.
+        The time is in s or text with its unit. A number that hardly any loop has, such as one in a unit other than the
+        one meant, causes a ``UserWarning``.
 
         Raises:
-            TypeError: the values are not given by key.
+            TypeError: the values are not a mapping by key.
         """
         if not isinstance(values, Mapping):
             raise TypeError(SET_SO)
@@ -184,33 +184,33 @@ class LiveLoop:
         """Replaces an element, at once or at a simulated time; returns the tick.
 
         Args:
-            kind: of the new element; "none" removes the one there is.
-            element: counted from 0; one past the end adds one.
-            at: when, in s or text with its unit.
-            reload: whether to load the kind's plugin file anew first.
-            parameters: of the new element.
+            kind: kind of the new element; "none" removes the present one.
+            element: which element to replace, counted from 0; one past the end adds one.
+            at: simulated time of the swap, in s or text with its unit; at once when None.
+            reload: whether to load the kind's plugin file again first.
+            parameters: parameters of the new element.
         """
         table = {"kind": kind, **plain(parameters)}
         return self._ask("swap", swap=table, element=element, at=_seconds(at), reload=reload)["tick"]
 
     def undo(self) -> None:
-        """Takes back the last swap or set."""
+        """Undoes the last swap or set."""
         self._ask("undo")
 
     def pause(self) -> int:
-        """Stands still at the next tick that can; returns it once all before it are done."""
+        """Pauses the run at the next tick at which it can stop; returns that tick once all before it are done."""
         return self._when_done(self._ask("pause")["tick"])
 
     def resume(self) -> int:
-        """Goes on; returns the tick."""
+        """Continues after a pause; returns the tick."""
         return self._ask("resume")["tick"]
 
     def pace(self, rate: float) -> int:
-        """Goes on at another pace, simulated seconds per second; infinite for as fast as it goes."""
+        """Changes the pace, in simulated seconds per second, infinite for as fast as possible; returns the tick."""
         return self._ask("pace", pace="free" if rate == math.inf else rate)["tick"]
 
     def step(self, ticks: int = 1) -> int:
-        """Goes on for some control ticks and stands still; returns the tick once all of them are done."""
+        """Runs for some control ticks, then stands still; returns the tick once all of them are done."""
         return self._when_done(self._ask("step", ticks=ticks)["tick"])
 
     def _when_done(self, tick: int) -> int:
@@ -223,11 +223,11 @@ class LiveLoop:
         return self._ask("stop")["tick"]
 
     def watch(self, every_s: float = 0.05) -> Iterator[dict[str, NDArray[np.float64]]]:
-        """Yields what the controller saw and did since the last time, until the run is over.
+        """Yields what the controller measured and did since the last item, until the run is over.
 
-        Each is arrays of shape (ticks,) by column: ``t`` in s, ``x`` in m, ``v`` in m/s, ``wall``, ``total`` and
-        ``dissipation.0`` in N, and so on. Whoever is too slow misses ticks and never holds the run up. Nothing comes
-        while the run stands still: resume it before, or from another thread.
+        Each item maps columns to arrays of shape (ticks,): ``t`` in s, ``x`` in m, ``v`` in m/s, ``wall``, ``total``
+        and ``dissipation.0`` in N, and so on. A reader that is too slow misses ticks and never holds the run up.
+        Nothing is yielded while the run stands still: resume it first, or from another thread.
         """
         from haploop.tools.attach.observed_run import ObservedRun
 
@@ -241,20 +241,20 @@ class LiveLoop:
                         yield {"t": t_s} | {name: np.frombuffer(of, "<f8") for name, of in block["columns"].items()}
 
     def finish(self) -> Result:
-        """Lets the run go on if it stands still, to its end, and returns its result."""
+        """Resumes the run if it stands still, waits for its end and returns its result."""
         with contextlib.suppress(RunNotFound):  # it has ended
             if self.status()["paused"]:
                 self.resume()
         return self.wait()
 
     def wait(self, timeout_s: float | None = None) -> Result:
-        """Waits for the end of the run and returns its result, verdict and all.
+        """Waits for the end of the run and returns its result, including the verdict.
 
         Raises:
-            TimeoutError: it still goes on.
-            CommandRefused: it stands still when it is to be awaited, and comes to no end by itself.
-            RunFailed: it could not go on.
-            RunNotFound: it was one elsewhere, whose files are not on this machine.
+            TimeoutError: the run is still going after this time.
+            CommandRefused: the run stands still when the wait begins, and would not end unless resumed.
+            RunFailed: the run could not continue.
+            RunNotFound: the run is on another host, so its files are not on this machine.
         """
         started, run = self._started, self._run
         if self._result:

@@ -1,4 +1,4 @@
-"""Results of advise and compare: the answer by name, the report of the command as text."""
+"""Results of advise and compare: the answer as attributes, the report of the command as text."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ class ComparisonResult(Comparison):
 
     @property
     def recommended(self) -> dict[str, Any]:
-        """What to take on the loop as described: ``element``, ``held_N_m`` (N/m) and ``parameters`` in SI units.
+        """The element to use on the loop as described: ``element``, ``held_N_m`` (N/m) and ``parameters`` in SI units.
 
-        The first element in the list that is told to hold more than none and less than no other; ``nothing`` where
-        none is.
+        It is the first in the list that can be told to hold more than no element does, and cannot be told to hold less
+        than any other; ``nothing`` if there is none.
         """
         return element_data(choice(self.loops[0]))
 
     @property
     def most(self) -> dict[str, Any]:
-        """What holds most on the loop as described, likewise, be it told from the others or not."""
+        """The element that holds most on the loop as described, in the same form, even if not told from the others."""
         return element_data(best(self.loops[0])[0])
 
     @property
     def held_N_m(self) -> dict[str, float]:
-        """What each element holds on the loop as described, N/m, mean over the seeds; by its name."""
+        """The stiffness that each element holds on the loop as described, N/m, mean over the seeds; by its name."""
         return {row.family: element_data(row)["held_N_m"] for row in self.loops[0].rows}
 
     def __str__(self) -> str:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from haploop.tools.sweep.table import SweepTable
 
 Plugins = Iterable[str | Path]
-# Numbers of an element, each an SI number or text with its unit; one may stand by itself.
+# Numbers of an element, each an SI number or text with its unit; a single one needs no list.
 Amount = float | str
 Amounts = Amount | Iterable[Amount]
 
@@ -38,10 +38,12 @@ def sweep(
 
     Args:
         of: a sweep file, or a name that ``haploop scenes`` lists; with ``axes``, a scene or its file.
-        axes: by key of the scene, an array or list of values, or a table ``{"from": 100, "to": 2000, "count": 20}``.
+        axes: for each key of the scene, an array or list of values, or a table
+            ``{"from": 100, "to": 2000, "count": 20}``.
         values: laid over the scene, as in ``load``.
-        out: directory of the table; one that holds this very sweep goes on. When None, nothing is kept.
-        workers: processes; one a core when None.
+        out: directory of the table; if it holds this very sweep, unfinished, that is continued. When None, nothing is
+            kept.
+        workers: number of processes; one per core when None.
         plugins: files with elements, walls, estimators or hand forces.
 
     Raises:
@@ -79,17 +81,17 @@ def advise(
     workers: int | None = None,
     out: str | Path | None = None,
 ) -> AdviceResult:
-    """Says how stiff a wall is safe on a device, with which element, and what breaks it first; takes minutes.
+    """Finds how stiff a wall is safe on a device, with which element, and what breaks it first; takes minutes.
 
     Args:
         device: a device that ``haploop scenes`` lists, or a scene file.
-        hand: a hand that it lists, a file with one, or "none".
-        delay: round trip, in s or text with its unit; ``estimator`` is that of the velocity.
-        out: directory in which every tried wall is kept, so that an advice that was interrupted goes on.
-        values, plugins, workers: as of ``sweep``.
+        hand: a hand that ``haploop scenes`` lists, a file with one, or "none".
+        delay: round-trip delay, in s or text with its unit; ``estimator`` is that of the velocity.
+        out: directory that keeps every wall that was tried, so that an interrupted advice can be continued.
+        values, plugins, workers: as for ``sweep``.
 
     Raises:
-        InvalidRequest, SceneError, PluginError, ElementError: a name is none, or the scene cannot be run.
+        InvalidRequest, SceneError, PluginError, ElementError: a name is unknown, or the scene cannot be run.
     """
     from haploop.api.results import AdviceResult
     from haploop.tools.advise.advice import advice
@@ -105,9 +107,10 @@ def advise(
 def compare(
     device: str | Path, *, grid: bool = True, workers: int | None = None, out: str | Path | None = None, **asked: Any
 ) -> ComparisonResult:
-    """Compares every stabilizer, each tuned alike, on a device or a scene; takes some minutes.
+    """Compares every stabilizer, each tuned in the same way, on a device or a scene; takes some minutes.
 
-    Arguments and errors are those of ``advise``; ``grid``: also with more delay, a finer encoder, a slower drive.
+    Arguments and errors are those of ``advise``; ``grid`` also compares them with more delay, with a finer encoder and
+    with a slower drive.
     """
     from haploop.api.results import ComparisonResult
     from haploop.tools.compare.command import ROWS, find
@@ -117,7 +120,7 @@ def compare(
 
 
 def _subject(device: str | Path, values: Values = (), plugins: Plugins = (), **names: Any) -> Subject:
-    """Makes the scene that is asked about, and tries its elements out."""
+    """Makes the scene to be studied, and tries its elements out."""
     from haploop.launch.scene.events import elements_of, try_out
     from haploop.tools.advise.subject import make_subject
 
@@ -129,7 +132,7 @@ def _subject(device: str | Path, values: Values = (), plugins: Plugins = (), **n
 
 @contextmanager
 def _kept(out: str | Path | None, name: str) -> Iterator[Path]:
-    """Gives a file in a directory that is made, or in one that is removed afterwards."""
+    """Yields a file path in the directory given, which is made if need be, or in one that is removed afterwards."""
     with tempfile.TemporaryDirectory(prefix="haploop-") if out is None else nullcontext(out) as directory:
         Path(directory).mkdir(parents=True, exist_ok=True)
         yield Path(directory, name)
@@ -148,22 +151,23 @@ def dissipate(
     plugins: Plugins = (),
     **columns: Any,
 ) -> Outcome:
-    """Tells what elements would have taken out of a recorded motion, which they do not change.
+    """Computes the energy that elements would have dissipated on a recorded motion; they do not change the motion.
 
     Args:
-        recording: CSV or TSV, directory of a run, or its log.
-        damping: of virtual damping, N s/m or text with a unit; one or several.
-        mass: of bi- and unidirectional inertia, kg or text; likewise.
-        elements: any other, ``"KIND KEY=VALUE ..."``.
-        wall: where a wall begins, m or text: elements act beyond it only, ``occupies`` says on which side.
-        delay_s: age of a force as it acts; that of the run when None.
+        recording: CSV or TSV file, directory of a run, or its log.
+        damping: virtual damping, in N s/m or text with a unit; one or several.
+        mass: mass of bi- and unidirectional inertia, in kg or text with a unit; one or several.
+        elements: any other elements, each ``"KIND KEY=VALUE ..."``.
+        wall: where a wall begins, in m or text with a unit: elements act only beyond it; ``occupies`` says on which
+            side of it the wall is.
+        delay_s: age of a force when it acts; that of the run when None.
         values: ``KEY=VALUE`` for [velocity], [acceleration] and [encoder].
-        columns: of a text file: position, time, velocity, acceleration, force by name or number; rate_Hz; their units
-            as length, time_unit, velocity_unit, acceleration_unit, force_unit.
+        columns: columns of a text file: position, time, velocity, acceleration, force by name or number; rate_Hz; the
+            units as length, time_unit, velocity_unit, acceleration_unit, force_unit.
 
     Returns:
-        ``outcome.elements[0].true_J`` and so on; ``outcome.trace.lines()`` are the books over time, rows t, x, then
-        sampled and true books of every element.
+        ``outcome.elements[0].true_J`` and so on; ``outcome.trace.lines()`` gives the books over time, rows t, x, then
+        the sampled and true books of every element.
 
     Raises:
         RecordingError, FileNotFoundError, LogError, SceneError, ElementError: the recording or selection is wrong.
@@ -191,7 +195,7 @@ def plot(what: Result | str | Path | Sequence[Result | str | Path], target: str 
         target: file of the figure, in the format of its suffix; ``figure.png`` in the directory when None.
 
     Raises:
-        ValueError: a run was kept in memory alone.
+        ValueError: a run was kept in memory only.
         FigureError: there is nothing to draw, or matplotlib is not installed.
     """
     from haploop.tools.draw import draw_any

@@ -1,1 +1,1 @@
-"""The command line. ``main`` names every command; the work is imported when it is used."""
+"""The command line. ``app`` lists every command; the work of a command is imported when it is called."""

@@ -1,4 +1,4 @@
-"""The command line: every command in the order of the help; what a command works with is imported when it is called."""
+"""The command line: every command in the order of the help; a command imports what it works with when it is called."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands for a first scene: what comes with haploop, and a scene of one's own made of it."""
+"""The commands for a first scene: list what comes with haploop, and write a scene of one's own from it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def scenes(
     name: Annotated[str | None, typer.Argument(help="print this one's file, to be copied", show_default=False)] = None,
     json: Json = False,
 ) -> None:
-    """List the scenes, devices, hands and sweeps there are. Each is found by its name, after files of your own."""
+    """List the scenes, devices, hands and sweeps there are. A name means your own file first, then one of these."""
     from haploop.launch.scene.bundled import FOLDERS, about, bundled, of_name, own_file
     from haploop.protocol.names import meant
 
@@ -78,7 +78,7 @@ def new(
         except FileExistsError:
             leave(f"{file} is there already; name a file that is not.", WRONG_USE)
         except OSError as error:
-            with contextlib.suppress(OSError):  # of which nothing is left, as a full disk leaves it
+            with contextlib.suppress(OSError):  # a full disk leaves a broken file, which is removed
                 file.unlink()
             leave(f"{file} cannot be written: {error.strerror}.", FAILED)
         try:

@@ -1,4 +1,4 @@
-"""``haploop explain``: a loop's limits, what one count comes to, the order of its steps, the cost of every effect."""
+"""``haploop explain``: a loop's limits, the effect of one count, the order of its steps, the cost of every effect."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def explain(
 
 
 def as_data(scene: Scene, planned: Plan, costs: Bill | None, kinds: Mapping[str, type[Element]]) -> dict[str, Any]:
-    """Returns terms, limits and plan of a scene, and costs where they were counted, as one JSON object."""
+    """Returns terms, limits and plan of a scene, and its costs if they were counted, as one JSON object."""
     from haploop.tools.linear.terms import limits_of, modes, one_count
 
     counted = one_count(scene, kinds)
@@ -125,7 +125,7 @@ def explanation(scene: Scene, planned: Plan, costs: Bill | None, kinds: Mapping[
 
 
 def _terms(scene: Scene, planned: Plan) -> Table:
-    """Makes the facts of the loop: T, masses, dampers, springs, what swings, and the two quotients of 2."""
+    """Makes the table of the loop: T, masses, dampers, springs, natural frequencies, and 2 b / T and 2 f_c / q."""
     from haploop.plant.chain.chain import Chain
     from haploop.protocol.walls.registry import make_wall
     from haploop.tools.linear.terms import modes
@@ -155,7 +155,7 @@ def _terms(scene: Scene, planned: Plan) -> Table:
 
 
 def _limits(scene: Scene, limits: list[Limit]) -> RenderableType:
-    """Makes a table of the limits that speak of the loop, and a sentence for each reason why others do not."""
+    """Makes a table of the limits that apply to the loop, and a sentence for each reason why others do not."""
     from rich.console import Group
     from rich.text import Text
 

@@ -17,7 +17,7 @@ from haploop.tools.command.options import FAILED, WRONG_USE, leave
 def join(
     file: Annotated[Path, typer.Argument(help="external-ROLE.json of a run with --external ROLE", show_default=False)],
 ) -> None:
-    """Take part in a run that waits with --external. As its plant or controller, until it ends."""
+    """Join a run that waits with --external. As its plant or controller, until the run ends."""
     from haploop.protocol.transport.messages import PROCESSES
     from haploop.protocol.transport.node import take_part
     from haploop.protocol.transport.sockets import SecureContext, Transport

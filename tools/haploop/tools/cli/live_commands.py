@@ -22,7 +22,7 @@ from haploop.tools.command.options import (
 
 @for_a_run
 def status(run: Run = None, json: Json = False) -> None:
-    """Show the live runs and their nodes. Of each its tick, its lag, whom it waits for, what it skipped."""
+    """Show the live runs and their nodes. Each with its tick, its lag, whom it waits for and what it skipped."""
     from haploop.launch.processes import run_directory
     from haploop.launch.processes.run_directory import ask
 
@@ -47,7 +47,7 @@ def status(run: Run = None, json: Json = False) -> None:
 
 
 def _ask(run_id: Any, as_json: bool, verb: str, **arguments: Any) -> None:
-    """Has a live run do something and prints its answer."""
+    """Sends a command to a live run and prints its answer."""
     from haploop.launch.processes import run_directory
     from haploop.launch.processes.run_directory import ask
 
@@ -61,13 +61,13 @@ def _ask(run_id: Any, as_json: bool, verb: str, **arguments: Any) -> None:
 
 @for_a_run
 def pause(run: Run = None, json: Json = False) -> None:
-    """Stand still at the next tick that can."""
+    """Pause at the next tick at which the run can stop."""
     _ask(run, json, "pause")
 
 
 @for_a_run
 def resume(run: Run = None, json: Json = False) -> None:
-    """Go on after a pause."""
+    """Continue after a pause."""
     _ask(run, json, "resume")
 
 
@@ -75,7 +75,7 @@ def resume(run: Run = None, json: Json = False) -> None:
 def step(
     ticks: Annotated[str, typer.Argument(help="control ticks")] = "1", run: Run = None, json: Json = False
 ) -> None:
-    """Go on for some ticks, then stand still."""
+    """Run for some ticks, then pause."""
     _ask(run, json, "step", ticks=parse_ticks(ticks))
 
 
@@ -85,7 +85,7 @@ def pace(
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """Go on at another pace."""
+    """Change the pace."""
     _ask(run, json, "pace", pace=parse_pace(rate))
 
 
@@ -117,13 +117,13 @@ def set_(
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """Change numbers of a running loop. They are wall.stiffness, wall.position, dissipation.0.mass and so on."""
+    """Change numbers of a running loop. These are wall.stiffness, wall.position, dissipation.0.mass and so on."""
     _ask(run, json, "set", set=parse_assignments(parameters), at=at)
 
 
 @for_a_run
 def undo(run: Run = None, json: Json = False) -> None:
-    """Take back the last swap or set of a running loop."""
+    """Undo the last swap or set of a running loop."""
     _ask(run, json, "undo")
 
 
@@ -138,7 +138,7 @@ def attach(
 ) -> None:
     """Join a running loop with a logger, a table or PlotJuggler.
 
-    The logger holds the loop up rather than miss anything; the others never do, and say what they skipped.
+    The logger slows the loop down rather than miss anything; the others never slow it, and report what they skipped.
     """
     from haploop.tools.attach.command import attach_to
 
@@ -148,7 +148,7 @@ def attach(
 def keys(
     directory: Annotated[Path, typer.Argument(help="new, or one that lacks some", show_default=False)],
 ) -> None:
-    """Make the keys of runs that other hosts can reach. A certificate for each process, and one for clients."""
+    """Make the keys for runs that other hosts can reach. A certificate for each process, and one for clients."""
     from haploop.protocol.transport.keys import make_keys
 
     with plain_errors():

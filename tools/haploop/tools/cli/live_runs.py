@@ -1,4 +1,4 @@
-"""Runs as the live page finds them: those that live, and those that are over in ``runs``."""
+"""Runs as the live page finds them: live ones, and finished ones in ``runs``."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from haploop.protocol.transport.sockets import SecureContext
     from haploop.protocol.transport.wire import Message
 
-# Recorded runs are looked for here, and so many of them offered.
+# The directory in which recorded runs are looked for, and how many of them are offered.
 _RUNS, _MOST_PAST = "runs", 50
 
 
 @dataclass
 class RecordedRun:
-    """A run that is over, as a viewer finds it."""
+    """A finished run, as a viewer finds it."""
 
     id: str
     out: Path
@@ -33,7 +33,7 @@ class RecordedRun:
 
     @classmethod
     def of_summary(cls, file: Path, ended_s: float) -> RecordedRun:
-        """Makes it of its summary, written at a time in s; of one that cannot be read its folder's name is told."""
+        """Makes it from its summary, written at a time in s; named by its folder if the summary cannot be read."""
         from haploop.launch.runs.run_files import recorded_summary
         from haploop.logger.log import LogError
         from haploop.logger.summary import misfit
@@ -48,11 +48,11 @@ class RecordedRun:
                 raise LogError(f"The verdict in {file} is not to be read.")
             words = [word, *stability["provisos"], when]
             return cls(name, file.parent, str(summary.get("title") or name), ", ".join(words))
-        except (LogError, KeyError, TypeError):  # somebody else's file, or of another version
+        except (LogError, KeyError, TypeError):  # a foreign file, or one of another version
             return cls(name, file.parent, name, when)
 
     def scene(self) -> Scene:
-        """Reads its resolved scene; raises OSError where there is none."""
+        """Reads its resolved scene; raises OSError if there is none."""
         from haploop.launch.runs.run_files import recorded_scene
         from haploop.launch.scene.mistakes import SceneError
 
@@ -65,32 +65,32 @@ class RecordedRun:
         return scene
 
     def units(self, scene: Scene, keys: Iterable[str]) -> dict[str, str]:
-        """Returns the units of these keys of a scene, and by kind and parameter; no key that has none."""
+        """Returns the units of these keys of a scene, and units by kind and parameter; leaves out keys without one."""
         from haploop.tools.figure.scene_units import element_units, unit_at
 
         kinds = element_units()
         return kinds | {key: unit for key in keys if (unit := unit_at(scene, key, kinds))}
 
     def make_context(self) -> SecureContext:
-        """Raises: nobody is there to connect to."""
+        """Raises OSError: there is no process to connect to."""
         raise OSError(f"Run {self.id} is over.")
 
 
 class LiveRuns:
-    """The live runs of this user, as a viewer finds and steers them; or one run elsewhere alone."""
+    """The live runs of this user, as a viewer finds and steers them; or only one run elsewhere."""
 
     def __init__(self, only: LiveRun | None = None) -> None:
         self._only = only
         self._recorded: dict[tuple[Path, float], RecordedRun] = {}
 
     def live(self) -> Sequence[LiveRun]:
-        """Returns the runs that live now, the oldest first."""
+        """Returns the runs that are live now, the oldest first."""
         from haploop.launch.processes import run_directory
 
         return [self._only] if self._only else run_directory.live_runs()
 
     def past(self) -> Sequence[RecordedRun]:
-        """Returns the recorded runs in ./runs that have a summary, the newest first; of a run elsewhere none."""
+        """Returns the recorded runs in ./runs that have a summary, the newest first; none for a run elsewhere."""
         if self._only:
             return []
         from haploop.launch.spec import SCENE
@@ -110,8 +110,8 @@ class LiveRuns:
     def stiffness_limit(self, scene: Scene) -> float | str:
         """Returns the largest stiffness with which the linear map of a loop is stable, N/m, or why there is none.
 
-        It is that without friction, which may hold what lies beyond. Plugin files are not read: they are code, and that
-        of a run is at work in the run alone.
+        Friction is left out of it, and may hold stiffer walls. Plugin files are not read: they are code, and the code
+        of a run works in the run alone.
         """
         from haploop.controller.dissipation.element import ElementError
         from haploop.protocol.register import UnknownKind
@@ -137,13 +137,13 @@ class LiveRuns:
         return limit if math.isfinite(limit) else "stable with any wall"
 
     def has_launcher(self, run: LiveRun) -> bool:
-        """Returns whether the process that started a run is there, which judges it in the end."""
+        """Returns whether the process that started a run, and judges it at its end, is still there."""
         from haploop.launch.processes import run_directory
 
         return run_directory.has_launcher(run)
 
     def ask(self, run: LiveRun, verb: str, arguments: Message) -> tuple[str, Message]:
-        """Has a run carry out a command."""
+        """Sends a command to a run and returns its answer."""
         from haploop.launch.processes.run_directory import CommandRefused, RunNotFound, ask
         from haploop.view.receive.runs import CommandFailed
 
@@ -151,5 +151,5 @@ class LiveRuns:
             return ask(run, verb, **arguments)
         except (CommandRefused, RunNotFound) as error:
             raise CommandFailed(str(error)) from error
-        except (TypeError, ValueError, OverflowError) as error:  # names of its own, numbers no message can carry
+        except (TypeError, ValueError, OverflowError) as error:  # names that ask() uses, numbers no message can carry
             raise CommandFailed(f"The arguments of {verb} cannot be used: {error}.") from error

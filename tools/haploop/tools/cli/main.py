@@ -1,4 +1,4 @@
-"""The start of the command line: light, so that Ctrl-C and SIGTERM are a sentence from the first moment on."""
+"""The start of the command line: light, so that Ctrl-C and SIGTERM give a sentence from the first moment on."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from haploop.tools.command.interrupt import SENTENCE, TYPE_CHECKING, LeavingAtOn
 if TYPE_CHECKING:
     from haploop.launch.processes.early import Started
 
-# The status with which typer leaves at Ctrl-C, without a word.
+# The status with which typer exits on Ctrl-C, without a message.
 _OF_TYPER = 130
 
 
@@ -26,21 +26,21 @@ def main() -> None:
             from haploop.launch.one_thread import ask_for_one_thread
 
             ask_for_one_thread(os.environ)
-            if sys.argv[1:2] == ["run"]:  # what starts no processes loads no more for it
+            if sys.argv[1:2] == ["run"]:  # a command that starts no processes need not load this
                 from haploop.launch.processes.early import start_early
 
                 start_early(sys.argv[1:], early)
             os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # a search through all packages for none
             from haploop.tools.cli.app import app
 
-            # Typer makes every command that it has, a fifth of what it takes, to call the one that is asked for.
+            # To call the one command asked for, typer would build every command it has, a fifth of the time it takes.
             asked = copy(app)
             asked.registered_commands = [
                 command for command in app.registered_commands if command.name in sys.argv[1:2]
             ] or app.registered_commands
         _refuse_what_is_no_text(sys.argv[1:])
-        asked(obj={"early": early})  # typer puts things of its own beside it
-    except OSError as error:  # one that no command has words of its own for
+        asked(obj={"early": early})  # typer adds entries of its own to it
+    except OSError as error:  # one for which no command has its own message
         print(f"{error.filename or 'A file'} cannot be used: {error.strerror or error}.", file=sys.stderr)
         sys.exit(1)
     except PluginError as error:  # met where a module is loaded, before a command has begun
@@ -52,12 +52,12 @@ def main() -> None:
         print(SENTENCE if isinstance(error, KeyboardInterrupt) else "Interrupted.", file=sys.stderr)
         sys.exit(1)
     finally:
-        for process in early.values():  # that no run has taken
+        for process in early.values():  # those that no run has taken over
             process.end()
 
 
 def _refuse_what_is_no_text(words: list[str]) -> None:
-    """Leaves with a sentence where an argument is not UTF-8, which no file and no message of a run could hold."""
+    """Exits with a sentence if an argument is not UTF-8 text, since no file and no message of a run could hold it."""
     for word in words:
         if "\0" in word or (not word.isascii() and any("\ud800" <= letter <= "\udfff" for letter in word)):
             print(f"Every argument, names of files too, must be UTF-8 text, but {word!r} was given.", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""The command that runs a scene to its end; what it works with is imported when it is called."""
+"""The command that runs a scene to its end; it imports what it works with when it is called."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def run(
     wait: Annotated[str | None, typer.Option("--wait", metavar="TIME", help="how long for [60 s]")] = None,
     json: Json = False,
 ) -> None:
-    """Run a scene to its end. Other terminals can steer and watch it meanwhile. The last line names its directory."""
+    """Run a scene to its end. Other terminals can watch and steer it meanwhile. The last line names its directory."""
     early = (context.obj or {}).get("early", {})
     with LeavingAtOnce(early):
         from haploop.launch.foreign import ProgramError, check_wait, read_programs
@@ -97,7 +97,7 @@ def run(
         prepared = start.prepare(scene, [*(set or []), *named], plugin or [], out, any_hand="plant" in programs)
         try:
             noted = print_notes(prepared.scene, prepared.kinds, scene, set or [])
-            # What an element prints is no part of the answer.
+            # What an element prints is not part of the answer.
             with ProgressLine(prepared.scene.title, prepared.scene.duration) as line, redirect_stdout(sys.stderr):
 
                 def told(run_id: str) -> None:
@@ -121,7 +121,7 @@ def run(
         except RunFailed as error:
             leave(f"{error}\n{what_was_logged(prepared.out)}", FAILED)
         except KeyboardInterrupt:
-            discard(prepared.out, prepared.is_new)  # where it never began
+            discard(prepared.out, prepared.is_new)  # if the run never began
             begun = (prepared.out / SCENE).exists()
             leave(
                 f"Interrupted at once; what was logged is in {prepared.out}."

@@ -1,4 +1,4 @@
-"""The commands that show runs, or set them beside one another."""
+"""The commands that show runs, or compare them with one another."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _WORDS = {
     "frequency_Hz": ("  at", "Hz"),
     "trajectory_sha256": ("trajectory hash", ""),
 }
-# Letters of a hash that are enough to tell two apart.
+# Characters of a hash that are enough to tell two apart.
 _HASH_LETTERS = 16
 # Logged columns of the controller in words.
 _COLUMNS = {
@@ -49,8 +49,8 @@ def plot(
 ) -> None:
     """Draw a run, several over one another, or a sweep's map.
 
-    A run that was killed is drawn as far as its log goes, a sweep as far as it has come. The last line names the
-    figure's file.
+    A run that was killed is drawn up to the end of its log, an unfinished sweep as far as it has come. The last line
+    names the figure's file.
     """
     from haploop.tools.draw import draw_any
     from haploop.tools.figure.data import FigureError
@@ -83,7 +83,7 @@ def diff(first: Directory, second: Directory, json: Json = False) -> None:
 
 
 def difference_table(found: Difference) -> RenderableType:
-    """Makes the table of two runs: what their scenes differ in, what came of them, their energies, where they part."""
+    """Makes the table of two runs: how their scenes differ, their results, their energies, and where they part."""
     from rich.console import Group
     from rich.text import Text
 

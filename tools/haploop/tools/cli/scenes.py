@@ -1,4 +1,4 @@
-"""The commands that take a scene, or what runs have left; what they work with is imported when they are called."""
+"""The commands that take a scene or the files of a run; they import what they work with when they are called."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def check(
     schema: Annotated[bool, typer.Option("--schema", help="print the JSON Schema of scenes instead")] = False,
     json: Json = False,
 ) -> None:
-    """Say what is wrong with a scene, or can hardly be meant."""
+    """Report what is wrong with a scene, or can hardly be meant."""
     from haploop.launch.plan.effects import notes
     from haploop.launch.scene.file import load
     from haploop.launch.scene.mistakes import SceneError
@@ -74,14 +74,14 @@ def check(
     else:
         tables = resolved.as_dict()
         force = tables.get("hand", {}).get("force", {})
-        if sys.stdout.isatty() and len(force.get("time", ())) > _MOST_PRINTED:  # into a file goes all of it
+        if sys.stdout.isatty() and len(force.get("time", ())) > _MOST_PRINTED:  # a file gets all of it
             for name in ("time", "force"):
                 force[name] = f"{len(force[name])} numbers from {min(force[name]):g} to {max(force[name]):g}"
         print(to_toml(tables), end="", flush=True)
         with_a = " with a plant of yours (--node plant=COMMAND)" if hand_is_unmodelled(resolved) else ""
         no_wall = "" if resolved.wall else " It has no [wall]: nothing pushes the device back."
         if notes(resolved, kinds):
-            print(file=sys.stderr)  # they are seen apart from all that is above
+            print(file=sys.stderr)  # sets the notes apart from all that is above
         noted = print_notes(resolved, kinds, scene, set or [])
         but = " But see above what it can hardly mean." if noted else ""
         print(f"{scene} can be run{with_a}.{no_wall}{but}", file=sys.stderr)
@@ -139,9 +139,9 @@ def replay(directory: Directory, json: Json = False) -> None:
 def judge(directory: Directory, json: Json = False) -> None:
     """Say whether the loop of a run is stable.
 
-    The run is repeated from its log, the hand then held still without noise, pushed hard and softly, and watched for
-    up to 64 s of simulated time: does it come to rest? The word is steady, limit-cycle,
-    growing, diverged, no-contact or undecided.
+    The run is repeated from its log. Then the hand is held still without noise, pushed hard and softly, and the loop
+    is watched for up to 64 s of simulated time: does it come to rest? The verdict is steady, limit-cycle, growing,
+    diverged, no-contact or undecided.
     """
     from haploop.launch.runs.replay import ReplayError, demand_own, logged_run, repeatable
     from haploop.launch.stability.judge import judge_scene
@@ -174,10 +174,10 @@ def export(
     topics: Annotated[str | None, typer.Option(help="only these channels, comma-separated [all]")] = None,
     force: Annotated[bool, typer.Option("--force", help="write over files that exist")] = False,
 ) -> None:
-    """Write a run's log in the format of other programs. Names and units are kept; stdout names the files.
+    """Write a run's log in a format for other programs. Names and units are kept; stdout names the files.
 
-    Any length of log takes the same memory. A number that is not there, an element's before it was swapped in, is NaN
-    in npz and parquet, an empty cell in csv, and left out in json-mcap, as are numbers that are not finite.
+    Memory use does not depend on the length of the log. A missing number, such as an element's before it was swapped
+    in, is NaN in npz and parquet, an empty cell in csv, and left out in json-mcap, as are numbers that are not finite.
     """
     from haploop.tools.export.command import export_run
 

@@ -24,7 +24,7 @@ def sweep(
 ) -> None:
     """Run a scene over one to three axes into a table. With [bisect], find where its verdict changes.
 
-    Can be stopped or killed; the same command with the same --out goes on. `haploop plot DIR` draws the map.
+    It can be stopped or killed; the same command with the same --out continues it. `haploop plot DIR` draws the map.
     """
     from haploop.tools.sweep.command import Request
     from haploop.tools.sweep.command import sweep as run_sweep
@@ -66,10 +66,10 @@ def dissipate(
     out: Annotated[Path | None, typer.Option(help="the figure's file [beside the recording]")] = None,
     json: Json = False,
 ) -> None:
-    """Tell what elements would have dissipated on a recording. They do not change its motion.
+    """Compute what elements would have dissipated on a recording. They do not change its motion.
 
-    Of a force that was recorded too: its true work, held from sample to sample, and whether it is passive. One pass in
-    flat memory. The last line names the figure's file.
+    If a force was recorded too: its true work, held from sample to sample, and whether it is passive. One pass in
+    constant memory. The last line names the figure's file.
     """
     from haploop.tools.dissipate.command import Request, Selection
     from haploop.tools.dissipate.command import dissipate as book
@@ -89,8 +89,8 @@ def paper(
 ) -> None:
     """Make the figures of the paper and the table of its claims.
 
-    Each figure is a PNG with its data and scenes beside it. The last line names the page. Stopped, the same command
-    goes on where it was.
+    Each figure is a PNG with its data and scenes beside it. The last line names the page. After a stop, the same
+    command continues where it was.
     """
     from haploop.tools.studies.choi2022.command import paper as make
 
@@ -112,9 +112,9 @@ def advise(
 ) -> None:
     """Say how stiff a wall a device can render safely.
 
-    With which element, what breaks it, and what would gain most.
+    With which element, what breaks it, and which change would gain most.
 
-    Can be stopped; the same command with --out DIR, the directory of the first, goes on.
+    It can be stopped; the same command with --out DIR, the directory of the first, continues it.
     """
     from haploop.tools.advise.command import advise as give
 

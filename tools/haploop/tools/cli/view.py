@@ -29,9 +29,9 @@ _ENDS = ("Ctrl-C", "closing it")
 _STAYS = "The run is over; its page {} until {}."
 _UNTIL = ("Ctrl-C ends it here", "it is closed, or Ctrl-C ends it here")
 _GONE = "The page is gone; the run goes on. Where it stands still, haploop resume lets it go on, Ctrl-C ends it."
-# A run waits so long for its viewer.
+# How long a run waits for its viewer.
 _HELD_S = 10.0
-# A viewer steps back where a run wants the processor.
+# A viewer yields the processor to a run.
 _NICE = 10
 
 
@@ -45,7 +45,7 @@ def view(
     led: Annotated[bool, typer.Option("--led", hidden=True)] = False,
 ) -> None:
     """Show runs in the browser as they go, and steer them. Those of this machine or one elsewhere, until Ctrl-C."""
-    # One led by another process gives it the link on stdout and ends with stdin.
+    # With --led, another process started this one: it reads the link on stdout, and closing stdin ends the viewer.
     if since not in SINCE:
         leave(f"--since must be {' or '.join(SINCE)}, but {since!r} was given.", WRONG_USE)
     check_extra()
@@ -79,20 +79,20 @@ def view(
             listening,
             first=shown and shown.id,
             from_start=since == "start",
-            stays=led,  # with --view the page is that of its run
+            stays=led,  # with --view the page stays with its run
             on_serving=serving,
             end=end,
             until_closed=until_closed,
         )
 
-    with contextlib.suppress(AttributeError, OSError):  # no such thing on this system, or not allowed
+    with contextlib.suppress(AttributeError, OSError):  # not available on this system, or not allowed
         os.nice(_NICE)
     with contextlib.suppress(KeyboardInterrupt):
         asyncio.run(main())
 
 
 def check_extra() -> None:
-    """Leaves with a sentence where something the page needs is not installed."""
+    """Exits with a sentence if something the page needs is not installed."""
     from haploop.view.serve.assets import MissingExtra, check_installed
 
     try:
@@ -102,7 +102,7 @@ def check_extra() -> None:
 
 
 def _open(address: str) -> None:
-    """Opens the page where there is a screen to open it on; a browser in the terminal could not draw it."""
+    """Opens the page if there is a screen to open it on; a browser in the terminal could not draw it."""
     import webbrowser
 
     screen = sys.platform == "darwin" or any(name in os.environ for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"))
@@ -111,12 +111,12 @@ def _open(address: str) -> None:
 
 
 def _at_eof(loop: asyncio.AbstractEventLoop, act: Callable[[], None]) -> None:
-    """Acts once nothing can come from stdin any more: whoever started this process has ended."""
+    """Acts once stdin is at its end: the process that started this one has ended."""
 
     def wait() -> None:
-        while os.read(sys.stdin.fileno(), 1 << 10):  # not by its buffer, whose lock would be held as Python ends
+        while os.read(sys.stdin.fileno(), 1 << 10):  # not through its buffer, whose lock would be held as Python ends
             pass
-        with contextlib.suppress(RuntimeError):  # the loop has ended by itself
+        with contextlib.suppress(RuntimeError):  # the event loop has already ended
             loop.call_soon_threadsafe(act)
 
     threading.Thread(target=wait, daemon=True).start()
@@ -124,9 +124,9 @@ def _at_eof(loop: asyncio.AbstractEventLoop, act: Callable[[], None]) -> None:
 
 @contextlib.contextmanager
 def viewing(wanted: bool, in_process: bool, until_closed: bool) -> Iterator[Viewer]:
-    """Shows what is run meanwhile from its first tick on; when it is over, keeps the page until Ctrl-C or its end.
+    """Shows the run inside the context from its first tick on; then keeps the page until Ctrl-C or until it ends.
 
-    The viewer is a process of its own; what becomes of it is no matter to the run.
+    The viewer is a process of its own, and the run does not depend on it.
     """
     if wanted and in_process:
         leave("--view needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
@@ -142,7 +142,7 @@ def viewing(wanted: bool, in_process: bool, until_closed: bool) -> Iterator[View
 
 
 class Viewer:
-    """The viewer of a run as a process of its own; does nothing where nobody looks."""
+    """The viewer of a run as a process of its own; does nothing if none is wanted."""
 
     def __init__(self, wanted: bool, until_closed: bool) -> None:
         self._wanted, self._until_closed, self._link = wanted, until_closed, ""
@@ -161,7 +161,7 @@ class Viewer:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            process_group=0,  # the first Ctrl-C is for the run alone; the page shows what came of it
+            process_group=0,  # the first Ctrl-C is for the run alone; the page shows its result
         )
         threading.Thread(target=self._tell, daemon=True).start()
 
@@ -177,7 +177,7 @@ class Viewer:
         self._link = self._process.stdout.readline().strip()
         if self._link:
             print(f"The page is at {self._link}", file=sys.stderr, flush=True)
-        self._process.stdout.read()  # to its end, which is that of the viewer
+        self._process.stdout.read()  # until the viewer ends
         if self._link and not self._is_over:
             print(_GONE, file=sys.stderr, flush=True)
 

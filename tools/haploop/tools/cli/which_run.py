@@ -21,8 +21,8 @@ _KEYS = typer.Option("--keys", metavar="DIR", help="with --at: clock.key and cli
 def for_a_run(command: Callable[..., None]) -> Callable[..., None]:
     """Gives a command with a parameter ``run`` the options --at ADDRESS and --keys DIR beside --run ID.
 
-    Its ``run`` is then what ``run_directory.find`` takes. Where it has a parameter ``at``, a simulated time, --at takes
-    that as well: an address has a colon, and no time has one.
+    Its ``run`` is then what ``run_directory.find`` takes. If the command has a parameter ``at``, a simulated time, --at
+    takes that as well: an address has a colon, and no time has one.
     """
     hints = typing.get_type_hints(command, include_extras=True)
     parameters = inspect.signature(command).parameters

@@ -1,1 +1,1 @@
-"""Shared parts of the commands of every tool: options, the code of plugins, notes, and leaving on Ctrl-C."""
+"""Shared parts of the commands of every tool: options, elements of plugin files, notes, and exiting on Ctrl-C."""

@@ -18,7 +18,7 @@ _IN_PLACE = "Note: the element {0} is that of a plugin, in place of the installe
 
 
 def kinds_with(plugins: list[Path]) -> dict[str, type[Element]]:
-    """Returns the installed elements and those of some files."""
+    """Returns the installed elements and those of some plugin files."""
     from haploop.controller.dissipation import registry
 
     return registry(plugins)
@@ -33,9 +33,9 @@ def print_note(note: str) -> None:
 def print_notes(
     scene: Scene, kinds: Mapping[str, type[Element]], path: Path | None = None, overrides: Sequence[str] = ()
 ) -> list[Note]:
-    """Prints on stderr what in a resolved scene may not be what was meant, one line each; returns it.
+    """Prints on stderr what in a resolved scene may not be what was meant, one line each; returns these notes.
 
-    With the file it was read from, and what was laid over that, each begins with the file and line it speaks of.
+    If the file the scene was read from, and what was laid over it, are given, each note begins with its file and line.
     """
     from haploop.controller.dissipation.registry import installed
     from haploop.launch.plan.effects import notes

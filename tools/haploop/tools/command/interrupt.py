@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM while modules are imported: the program leaves at once, with a sentence. Itself it is light."""
+"""Ctrl-C and SIGTERM while modules are imported: the program exits at once, with a sentence. Imports little itself."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 import signal
 from collections.abc import Mapping
 
-TYPE_CHECKING = False  # as that of typing, which takes longer to load than all else here
+TYPE_CHECKING = False  # stands for that of typing, which takes longer to load than all else here
 if TYPE_CHECKING:
     from haploop.launch.processes.early import Started
 
@@ -14,12 +14,12 @@ SENTENCE = "Interrupted before anything began."
 
 
 class LeavingAtOnce:
-    """Has the two signals end the program while nothing is begun yet; a context manager, for the main thread.
+    """Makes the two signals end the program while nothing has begun yet; a context manager, for the main thread.
 
     An exception raised by a signal within an import may be lost, or be shown with Python's own words.
 
     Args:
-        processes: what is ended with the program.
+        processes: processes that are ended with the program.
     """
 
     def __init__(self, processes: Mapping[str, Started] | None = None) -> None:
@@ -36,7 +36,7 @@ class LeavingAtOnce:
         for number in (signal.SIGINT, signal.SIGTERM):
             try:
                 self._before[number] = signal.signal(number, self._leave)
-            except ValueError:  # in another thread signals are somebody else's business
+            except ValueError:  # only the main thread may handle signals
                 return
 
     def __exit__(self, *_: object) -> None:

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and the reading of their texts."""
+"""Arguments and options that several commands share, and how their texts are read."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import typer
 
 
 def complete(folder: str) -> Callable[[str], list[str]]:
-    """Returns what completes a word: the names of what comes with haploop in a folder, and files of one's own."""
+    """Returns a shell completion: the names of what comes with haploop in a folder, and files of one's own."""
 
     def completed(begun: str) -> list[str]:
         from glob import escape, glob
@@ -32,7 +32,7 @@ _INSTEAD = "Note: {0} is your own {1}, taken in place of the one that comes with
 
 
 def told(folder: str) -> Callable[[Any], Any]:
-    """Returns what notes on stderr that a name stands for a file of one's own, though one comes with haploop."""
+    """Returns a callback that notes on stderr when a name means one's own file although one comes with haploop."""
 
     def as_given(name: Any) -> Any:
         from haploop.launch.scene.bundled import taken_instead
@@ -109,7 +109,7 @@ def parse_pace(text: str) -> float | Literal["free"]:
 
 
 def parse_ticks(text: str) -> int:
-    """Returns a whole number of ticks; how many there may be, the run knows."""
+    """Returns a whole number of ticks; the run knows how many are allowed."""
     try:
         return int(text)
     except ValueError:
@@ -117,7 +117,7 @@ def parse_ticks(text: str) -> int:
 
 
 def parse_seconds(text: str | None, option: str = "--at") -> float | None:
-    """Returns a time in s, given in seconds or with its unit; None for none."""
+    """Returns a time in s, given in seconds or with its unit; None if none is given."""
     if text is None:
         return None
     with suppress(ValueError):
@@ -132,7 +132,7 @@ def parse_seconds(text: str | None, option: str = "--at") -> float | None:
 
 
 FAILED, WRONG_USE = 1, 2
-# Parts of a log that end within this, s, are said to end together.
+# Parts of a log that end within this time of each other, s, are said to end together.
 _APART_S = 0.01
 _LOGGED = "What was logged is in {0}: {1}. The books end where the first of these does."
 
@@ -144,7 +144,7 @@ def leave(message: str, status: int) -> NoReturn:
 
 
 def what_was_logged(directory: Path) -> str:
-    """Tells where the log of a run that failed is and, where its parts end apart, until when each was logged."""
+    """Tells where the log of a failed run is and, if its parts end at different times, until when each was logged."""
     from haploop.logger import stream
     from haploop.logger.log import LogError
 
@@ -167,7 +167,7 @@ def print_json(data: Any) -> None:
 
 @contextlib.contextmanager
 def plain_errors() -> Iterator[None]:
-    """Turns the errors of the packages below into messages: 2 for wrong use, 1 for a run that failed."""
+    """Turns errors of the lower packages into messages; the exit status is 2 for wrong use, 1 for a run that failed."""
     from haploop.controller.dissipation import ElementError, PluginError
     from haploop.launch.processes.run_directory import CommandRefused, RunNotFound
     from haploop.launch.scene.mistakes import SceneError
