@@ -1,4 +1,4 @@
-"""The whole advice on a device or a scene, and as data."""
+"""The whole advice on a device or a scene, also as data."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ UPPER_BOUND = (
 )
 ADVICE = "Advice on {name}."
 VARIED, HALVED, NOT_VARIED = "Varied by 20 %: {0}.", "Halved and doubled: {0}.", "Not varied, as built: {0}."
-# Walls on which the case that breaks first is shown, as multiples of that which broke.
+# Walls on which the case that breaks first is shown, as multiples of the wall that broke.
 _STIFFER, _UNSTEADY = (1.0, 1.05, 1.1, 1.2, 1.4, 1.7, 2.0), ("limit-cycle", "growing", "diverged")
 _RIGID = "There is no [transmission]: what a resonance of the structure takes is not in it."
 _PLUGIN = "The scene's own wall is not tried: its elements come from a plugin file."
@@ -65,9 +65,9 @@ SAFE_MEANS = (
 
 @dataclass(frozen=True)
 class Changed:
-    """What a changed loop bears in the hardest corners, and as a multiple of what it does without the change.
+    """What a changed loop bears in the hardest corners, also as a multiple of what it bears without the change.
 
-    With the element tuned anew, or none, whichever bears more; and ``alone``, without one.
+    ``limit`` is with the element tuned again or with none, whichever bears more; ``alone`` is without an element.
     """
 
     words: str
@@ -79,7 +79,7 @@ class Changed:
 
     @classmethod
     def from_borne(cls, words: str, borne: Borne, base: Borne) -> Self:
-        """Makes it of what the loop bears changed and unchanged."""
+        """Makes it from what the loop bears with and without the change."""
         limits = (borne.limit, base.limit), (borne.alone, base.alone)
         factor, alone = (of.stiffness_N_m / to.stiffness_N_m if to.stiffness_N_m else 0.0 for of, to in limits)
         return cls(words, borne.limit, factor, borne.alone, alone, borne.values)
@@ -90,19 +90,19 @@ class Advice:
     """The whole advice.
 
     Attributes:
-        is_ideal: whether the device is rigid and its loop without delay: then it is an upper bound.
-        tried_by: what every wall was tried by, in words.
-        uncertain: the factors between which each uncertain quantity, or assumed number, was taken.
-        not_varied: what the loop has and was taken as described.
-        hand: its mass, kg, damping, N s/m, and stiffness, N/m; None where there is none.
-        grip: through which it holds, N s/m and N/m; None where there is none.
-        unchanged: what the loop bears in the hardest corners, as what the changes are held against.
-        changed, without: that after each change of the device, and without each cause of buzzing, best first.
-        assumed: each assumed number with the limit at half and at double of it.
-        own: of a scene with a wall: its stiffness, and what it does with its own elements; None where it bears all.
-        scene: that shows the advised wall; None where nothing is safe.
-        provisos: what the verdict of that scene says beside its word.
-        breaks: that shows the case which breaks first, on the softest wall on which its verdict is not steady; where
+        is_ideal: whether the device is rigid and its loop has no delay: the advice is then an upper bound.
+        tried_by: the task that every wall was tried with, in words.
+        uncertain: the factors between which each uncertain quantity, or assumed number, was varied.
+        not_varied: what the loop has that was taken as described.
+        hand: mass, kg, damping, N s/m, and stiffness, N/m, of the hand; None if there is none.
+        grip: damping, N s/m, and stiffness, N/m, of the grip through which the hand holds; None if there is none.
+        unchanged: what the unchanged loop bears in the hardest corners, with which the changes are compared.
+        changed, without: the same after each change of the device, and without each cause of buzzing, best first.
+        assumed: each assumed number with the limits at half and at twice its value.
+        own: for a scene with a wall: its stiffness, and how it fails with its own elements, None if it bears all cases.
+        scene: the scene that shows the advised wall; None if nothing is safe.
+        provisos: the provisos in the verdict of that scene.
+        breaks: the scene of the case that breaks first, on the softest wall on which its verdict is not steady; if
             there is none, on the wall that broke, up to the end of the stretch in which that was seen.
     """
 
@@ -150,7 +150,7 @@ class Advice:
 
     @property
     def without_N_m(self) -> float:
-        """The stiffest safe wall without an element, N/m; 0 where none is."""
+        """The stiffest safe wall without an element, N/m; 0 where no wall is safe."""
         return self.found.alone_N_m
 
     def __repr__(self) -> str:
@@ -160,13 +160,13 @@ class Advice:
 
     @property
     def headline(self) -> str:
-        """What the device is taken for, and what was varied; the answer is ``recommended``."""
+        """What the device is taken as, and what was varied; the answer is ``recommended``."""
         lead = (UPPER_BOUND if self.is_ideal else ADVICE).format(name=self.name)
         return f"{lead} {reach(self.uncertain, self.not_varied)}"
 
 
 def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lambda name: None) -> Advice:
-    """Searches the wall, then what a change of the device, or of what is assumed of it, would make of it."""
+    """Searches for the wall, then for the effect of changing the device, or what is assumed of it, on that wall."""
     scene, loop = subject.scene, make_loop(subject.scene, subject.has_task)
     assumed = [of for of in subject.assumed if is_number(value_at(loop, of.key))]
     keys = [of.key for of in assumed]
@@ -237,19 +237,19 @@ def is_ideal(loop: Scene) -> bool:
 
 
 def advised_scene(subject: Subject, loop: Scene, found: Found) -> Scene | None:
-    """Returns the advised wall with its element, called an upper bound if it is one; None on no wall."""
+    """Returns the scene of the advised wall and its element, titled an upper bound if it is one; None without a wall."""
     return _shown(subject, loop, found, found.stiffness_N_m, Case(1.0), "upper bound, " if is_ideal(loop) else "")
 
 
 def _provisos(scene: Scene) -> tuple[str, ...]:
-    """Returns what a run of the advised scene says beside its word."""
+    """Returns the provisos in the verdict of a run of the advised scene."""
     return tuple(run_in_process(scene, installed_kinds()).get("stability", {}).get("provisos", ()))
 
 
 def _shown(
     subject: Subject, loop: Scene, found: Found, stiffness_N_m: float, case: Case, called: str = ""
 ) -> Scene | None:
-    """Returns a case on a wall with the advised element, called so in its title; None on no wall."""
+    """Returns the scene of a case on a wall with the advised element, ``called`` so in its title; None on no wall."""
     if not stiffness_N_m:
         return None
     best, scene = found.advised, case.scene(loop)
@@ -262,10 +262,10 @@ def _shown(
 
 
 def _breaking(subject: Subject, loop: Scene, found: Found) -> Scene | None:
-    """Returns the case that breaks first on the softest wall, from that which it broke on, that is not steady there.
+    """Returns the case that breaks first, on the softest wall, from the one that broke up, on which it is not steady.
 
-    Where a run calls all of these steady, the scene is of the wall that broke and ends with the stretch in which it
-    was seen to; None where no hand would feel what a run does there.
+    If a run calls all of these steady, the scene is of the wall that broke and ends with the stretch in which it was
+    seen to break; None if no hand would feel what a run does there.
     """
     if not found.breaks or not (case := found.breaks[1].tried):
         return None
@@ -277,7 +277,7 @@ def _breaking(subject: Subject, loop: Scene, found: Found) -> Scene | None:
 
 
 def ending_with(scene: Scene, loop: Scene, at_s: float) -> Scene | None:
-    """Returns a scene that ends with the stretch up to this time and is not pushed; None if it is not felt there."""
+    """Returns a scene that ends with the stretch up to this time and is not pushed; None if nothing is felt there."""
     lasts_s, rate = STRETCH_S * slowness(loop), loop.clock.control_rate
     lone, ticks = LoneLoop(scene, installed_kinds()), round(lasts_s * rate)
     lone.go_on(round(at_s * rate) - ticks)
@@ -288,7 +288,7 @@ def ending_with(scene: Scene, loop: Scene, at_s: float) -> Scene | None:
 
 
 def advice_data(told: Advice, sentences: list[str]) -> AdviceData:
-    """Returns the advice as one JSON object: what is recommended and the sentences first, then all that was found."""
+    """Returns the advice as one JSON object: the recommendation and the sentences first, then all that was found."""
     return {
         "headline": told.headline,
         "recommended": told.recommended,

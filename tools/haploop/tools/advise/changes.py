@@ -36,7 +36,7 @@ _ADDED_DAMPING = 1.0
 
 
 def changes(loop: Scene) -> dict[str, Scene]:
-    """Returns the loops with one change each, by what is changed; only what is there and not 0 can be."""
+    """Returns the loops with one change each, by what is changed; only values that exist and are not 0 are changed."""
     found = {words: scale_quantities(loop, {key: factor}) for words, key, factor in _SCALED if value_at(loop, key)}
     clock = loop.clock
     key = "transmission.motor_damping" if loop.transmission else "device.damping"
@@ -52,7 +52,7 @@ def changes(loop: Scene) -> dict[str, Scene]:
 
 
 def idealised(loop: Scene) -> dict[str, Scene]:
-    """Returns the loops without one cause of buzzing each, which no change of a device reaches: they tell the cause."""
+    """Returns loops that each lack one cause of buzzing, as no change of a device can achieve: they show the cause."""
     found = {f"no {DELAY}": with_value(loop, "clock.round_trip_delay", 0.0)} if loop.clock.round_trip_delay else {}
     for name in dict.fromkeys(name for effect in all_effects() for name in effect.frees):
         changed = loop
@@ -79,9 +79,9 @@ class Borne:
     """What a loop bears in its hardest corners.
 
     Attributes:
-        limit: with the element at the size that suits it, or without any, whichever bears more.
+        limit: with the element at its best size, or without one, whichever bears more.
         alone: without an element.
-        values: that size; empty where none bears as much.
+        values: that size; empty if the loop without an element bears as much.
     """
 
     limit: Limit
@@ -90,10 +90,11 @@ class Borne:
 
 
 def changed_limits(trial: Trial, loops: Sequence[Scene], found: Found) -> list[Borne]:
-    """Returns what changed loops bear, nothing else changed but the size of the element, which is tuned anew.
+    """Returns what changed loops bear, with nothing else changed but the size of the element, which is tuned again.
 
-    As described and in the corners that are hardest on the loop unchanged, where the change left them, at the holds
-    tried first: as described alone the largest element that just does not buzz bears most, and a change tells nothing.
+    They are tried as described and in the corners hardest on the unchanged loop, as far as the change left these, at
+    the holds tried first. Tried only as described, the largest element that just does not buzz would bear most, and a
+    change would tell nothing.
     """
     best, near = found.advised, found.stiffness_N_m or found.advised.nominal.stiffness_N_m
     sizes = around(best.values) if best.values else []
@@ -109,7 +110,7 @@ def changed_limits(trial: Trial, loops: Sequence[Scene], found: Found) -> list[B
     known: list[dict[Values, Limit]] = [{} for _ in loops]
     for (place, values), limit in zip(asked, some[len(loops) :], strict=True):
         known[place][values] = limit
-    # Where what suits a changed loop lies at an end of the sizes it may lie beyond.
+    # If the best size for a changed loop is at an end of those tried, the true best may lie beyond.
     beyond = [(place, values) for place, of in enumerate(known) for values in outward(of)]
     for (place, values), limit in zip(beyond, limits(trial, [query(*each) for each in beyond], CLOSE), strict=True):
         known[place][values] = limit
@@ -122,7 +123,7 @@ def changed_limits(trial: Trial, loops: Sequence[Scene], found: Found) -> list[B
 
 
 def outward(known: Mapping[Values, Limit]) -> list[Values]:
-    """Returns two more sizes beyond that which bears most, where it is the smallest or the largest."""
+    """Returns two more sizes beyond the one that bears most, if that is the smallest or the largest."""
     sizes = sorted(known)
     if not sizes:
         return []
@@ -136,7 +137,7 @@ def _rungs(near_N_m: float) -> tuple[float, ...]:
 
 
 def _cases(loop: Scene, hardest: Sequence[Corner]) -> tuple[Case, ...]:
-    """Returns the cases of a changed loop; what it has no longer is not varied, nor is what is assumed."""
+    """Returns the cases of a changed loop; quantities that the change removed are not varied, nor assumed ones."""
     names = ranges(loop)
     corners = [tuple((name, factor) for name, factor in corner if name in names) for corner in hardest]
     return tuple(Case(hold, corner) for corner in dict.fromkeys(((), *corners)) for hold in FIRST_HOLDS)

@@ -59,7 +59,7 @@ def advise(
             leave(str(error), WRONG_USE)
         try_out(elements_of(asked.scene), kinds)
         tried = Case(1.0).scene(make_loop(asked.scene, asked.has_task))
-        # The stiffness of a loop that is searched is a place holder.
+        # The stiffness in a loop to be searched is a placeholder.
         tried = with_value(tried, "wall.stiffness", value_at(asked.scene, "wall.stiffness"))
         asked = replace(asked, notes=(*print_notes(tried, kinds), *asked.notes))
         out = _output(out, asked)
@@ -79,7 +79,7 @@ def advise(
 
 
 def _output(out: Path | None, asked: Subject) -> Path:
-    """Returns a new directory, or one with the walls of an advice on the same scene, which then goes on.
+    """Returns a new directory, or one with the walls of an advice on the same scene, which is then continued.
 
     Raises OutputError for one that holds anything else.
     """
@@ -93,7 +93,7 @@ def _output(out: Path | None, asked: Subject) -> Path:
 
 
 def breaks_words(found: Advice) -> str:
-    """Returns what the scene of the case that breaks first shows, which may be a stiffer wall than that told to."""
+    """Returns what the scene of the case that breaks first shows; its wall may be stiffer than the one told to break."""
     scene, broken = found.breaks, found.found.breaks
     assert scene
     assert scene.wall
@@ -124,7 +124,7 @@ def _write(found: Advice, out: Path) -> AdviceData:
 
 @contextlib.contextmanager
 def _progress() -> Iterator[tuple[Callable[[str], None], Callable[[int], None]]]:
-    """Shows stage and runs so far on a terminal, and a line a stage elsewhere."""
+    """Shows stage and runs so far on a terminal, and one line per stage elsewhere."""
     screen, now = console(stderr=True), ["starting"]
     with screen.status("starting") if screen.is_terminal else contextlib.nullcontext() as status:
 

@@ -11,8 +11,8 @@ from haploop.protocol.scene.scene import ElementTable, Hand, Scene
 from haploop.tools.render.units import fixed
 
 Values = tuple[float, ...]
-# Parameters of one element, from the most that a loop can bear down, each the one before by this factor; about the best
-# they are narrowed by its square root. Of two together each takes these factors of its best alone.
+# How many parameters of one element are tried, from the largest that a loop can bear down, and the factor between them;
+# around the best its square root. Of two elements together, each takes these factors of its best alone.
 _COUNT, FACTOR, _OF_BOTH = 7, 2.0, (1.0, 0.5, 0.25)
 # Bases of the Halton sequence.
 _BASES = (2, 3, 5)
@@ -23,7 +23,7 @@ class Family:
     """One element, or two together, by its name and the kind and key of each parameter that is searched.
 
     Attributes:
-        acts: as of a scene's element.
+        acts: as in a scene's element.
     """
 
     name: str
@@ -97,9 +97,9 @@ OTHERS = tuple(each for each in STABILIZERS if each not in (NOTHING, *SINGLE, BO
 
 
 def first_choices(family: Family, loop: Scene) -> list[Values]:
-    """Returns parameters from about the largest that a loop can bear down.
+    """Returns parameters downwards from about the largest that a loop can bear.
 
-    B = m / (T/2 + td) for damping; the moved mass; four ticks and the delay for the lead of a force.
+    That is B = m / (T/2 + td) for damping, the moved mass for inertia, four ticks plus the delay for a force's lead.
     """
     [(_, key)] = family.parts
     most = {"mass": _moved_kg, "damping": _most_damping, "time": _most_time}[key](loop)
@@ -107,10 +107,10 @@ def first_choices(family: Family, loop: Scene) -> list[Values]:
 
 
 def box(family: Family, loop: Scene, alone_N_m: float) -> list[tuple[float, float]]:
-    """Returns between which values each parameter of a family is searched, given the stiffest wall without any.
+    """Returns the ends between which each parameter of a family is searched, given the stiffest wall without any.
 
-    Damping to twice what a loop can bear, B = 2 m / (T/2 + td); inertia to the moved mass; a coupling to 32 times as
-    stiff as that wall; a force's lead to four ticks and the delay.
+    Damping is searched up to twice what a loop can bear, B = 2 m / (T/2 + td); inertia up to the moved mass; a coupling
+    up to 32 times as stiff as that wall; a force's lead up to four ticks plus the delay.
     """
     damping, moved = _most_damping(loop), _moved_kg(loop)
     ends = {
@@ -143,7 +143,7 @@ def applies(family: Family, loop: Scene) -> bool:
 
 
 def beside(values: Values) -> list[Values]:
-    """Returns parameters half a step about some, each by itself."""
+    """Returns these parameters with each in turn moved by half a step down and up."""
     return [
         (*values[:index], _rounded(value * FACTOR**half), *values[index + 1 :])
         for index, value in enumerate(values)
@@ -152,17 +152,17 @@ def beside(values: Values) -> list[Values]:
 
 
 def around(values: Values) -> list[Values]:
-    """Returns parameters at half, 0.7, once and 1.4 of their sizes, all by the same."""
+    """Returns the parameters at 0.5, 0.7, 1 and 1.4 times their sizes, all by the same factor."""
     return [scaled_values(values, half) for half in (-1.0, -0.5, 0.0, 0.5)]
 
 
 def scaled_values(values: Values, steps: float) -> Values:
-    """Returns parameters so many steps larger, all by the same."""
+    """Returns the parameters this many steps larger, all by the same factor."""
     return tuple(_rounded(value * FACTOR**steps) for value in values)
 
 
 def together(damping: Values, inertia: Values) -> list[Values]:
-    """Returns combinations of what is best alone, which are the largest of each."""
+    """Returns combinations in which each element has at most its best size alone."""
     return [(_rounded(damping[0] * b), _rounded(inertia[0] * m)) for b, m in itertools.product(_OF_BOTH, _OF_BOTH)]
 
 

@@ -27,7 +27,7 @@ _LIGHT, _HALF, _SOFTER = "white", "#9CC3E0", "#B07A45"
 _COLUMNS = 85, 155, 230
 # Numbers at which an axis may begin and end, in every decade.
 _ENDS = (1.0, 2.0, 5.0)
-# An axis goes no further down from the stiffest wall; what is softer stands at its end, as an arrow.
+# An axis ends at this factor below the stiffest wall; softer ones are drawn at its end, as arrows.
 _SPAN = 300.0
 
 
@@ -97,7 +97,7 @@ def _walls(ax: Axes, told: Advice, lines: list[str]) -> list[float]:
 
 
 def _changes(ax: Axes, told: Advice, others: list[tuple[str, Limit, Limit | None]]) -> list[float]:
-    """Marks what the loop bears after every change, with a line from what it does as it is; returns these, N/m."""
+    """Marks what the loop bears after every change, with a line from what it bears unchanged; returns these, N/m."""
     nominal, seen = told.unchanged.limit.stiffness_N_m, set[str]()
     for row, (_, limit, alone) in enumerate(others):
         stiffness = limit.stiffness_N_m
@@ -148,7 +148,7 @@ def _ends(stiffnesses: list[float]) -> tuple[float, float]:
 
 
 def _keep_within(ax: Axes) -> None:
-    """Moves what lies beyond the soft end of the axis to that end, marks as arrows."""
+    """Moves what lies beyond the soft end of the axis to that end; marks become arrows."""
     end = ax.get_xlim()[0]
     for line in ax.lines:
         at = np.asarray(line.get_xdata(), float).tolist()

@@ -1,4 +1,4 @@
-"""The corners that are hardest on a wall, followed in the direction in which it bears less, hold by hold."""
+"""The corners that are hardest on a wall, found hold by hold in the direction in which it bears less."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from haploop.tools.advise.walls.corners import Corner, Ranges, design, flipped
 from haploop.tools.advise.walls.store import Job, Tried
 from haploop.tools.advise.walls.trial import Trial
 
-# Walls that every corner is tried by, as multiples of one near the limit.
+# Walls that every corner is tried with, as multiples of one near the limit.
 _RUNGS = tuple(1.1**step for step in range(-5, 7))
-# Steps from a corner to its hardest neighbour, and how many corners of each hold are told.
+# Steps from a corner to its hardest neighbour, and how many corners of each hold are returned.
 _STEPS, _TOLD = 4, 5
 
 # What a corner bears at a hold: how many rungs up to the first that fails, and how many in all.
@@ -24,8 +24,8 @@ def hardest(
 ) -> tuple[Corner, ...]:
     """Returns the corners in which walls about this stiffness bear least, the hardest of each hold first.
 
-    None where no wall is safe, or nothing uncertain. Main effects over the corners of the design say at which end each
-    quantity is worse: that vertex is tried, with all its neighbours, and the search goes on from the hardest of all.
+    Empty if no wall is safe or nothing is uncertain. Main effects over the corners of the design show at which end each
+    quantity is worse: that vertex is tried with all its neighbours, and the search continues from the hardest of all.
     """
     if not near_N_m or not of:
         return ()

@@ -1,4 +1,4 @@
-"""Stiffest walls as known formulas give them with this device's numbers, and as published for devices, with sources."""
+"""Stiffest walls by known formulas with this device's numbers, and as published for devices, with sources."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Formula:
     """A formula with its numbers.
 
     Attributes:
-        formula, numbers, means: in the field's letters, with this device's numbers, and what happens beyond.
+        formula, numbers, means: the formula in the field's symbols, this device's numbers, and what happens beyond.
         stiffness_N_m: infinite where it sets no limit.
     """
 
@@ -33,9 +33,9 @@ class Formula:
 def formulas(loop: Scene) -> list[Formula]:
     """Returns the formulas for a wall alone on this loop.
 
-    Both halves of Abbott and Okamura (2005): friction has to bridge one step of the encoder's force, or the wall has no
-    place to rest; and viscous damping has to take what sampling generates, or friction or the hand must. Then the exact
-    map of one tick of the same loop without encoder and friction, where it is linear.
+    Both halves of Abbott and Okamura (2005): friction has to bridge one step of the encoder's force, or the device has
+    no place to rest; viscous damping has to absorb the energy that sampling generates, or friction or the hand must.
+    Then the exact map of one tick of the same loop without encoder and friction, if that loop is linear.
     """
     q = loop.encoder.resolution if loop.encoder else 0.0
     friction = loop.friction.kinetic if loop.friction else 0.0
@@ -61,11 +61,11 @@ def formulas(loop: Scene) -> list[Formula]:
 
 @dataclass(frozen=True)
 class Published:
-    """A stiffness in N/m that somebody states or shows, by whom, and what it is.
+    """A stiffness in N/m that has been stated or shown, by whom, and what it is.
 
     Attributes:
-        by: in a word or two.
-        source: in full.
+        by: who, in a word or two.
+        source: the source in full.
     """
 
     stiffness_N_m: float

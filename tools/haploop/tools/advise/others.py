@@ -1,4 +1,4 @@
-"""Elements beside the simple ones: which are worth trying in every corner, and which may hold more."""
+"""Elements other than the simple ones: which are worth trying in every corner, and which may hold more."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from haploop.tools.advise.walls.rendered import tried
 from haploop.tools.advise.walls.store import Job, Tried
 from haploop.tools.advise.walls.trial import Trial
 
-# Parameters that are tried of an element that renders less than its wall, and how closely its limit is found.
+# How many parameters are tried of an element that renders less than its wall, and how closely its limit is found.
 _POINTS, _TOLERANCE = 6, 0.25
 
 Choice = tuple[Family, Values]
@@ -29,7 +29,7 @@ class Hidden:
 
 
 def others_bearing(loop: Scene, trial: Trial, cases: Sequence[Case], least_N_m: float) -> list[Choice]:
-    """Returns the other elements, each with every parameter, with which a wall so stiff bears some cases."""
+    """Returns the other elements, with every parameter with which a wall this stiff bears all the given cases."""
     choices = [(family, values) for family in OTHERS for values in first_choices(family, loop)]
     return bearing(loop, trial, choices, cases, least_N_m)
 
@@ -40,7 +40,7 @@ def hiding(loop: Scene, trial: Trial, alone_N_m: float, least_N_m: float) -> tup
     found: list[Hidden] = []
     for family in (each for each in HIDING if applies(each, loop)):
         choices = [(family, values) for values in halton(box(family, loop, alone_N_m), _POINTS)]
-        # What is held is less than the wall: where that is too stiff for the loop, so is any that would hold as much.
+        # What is held is less than the wall: if a wall this stiff is too stiff, so is any that would hold as much.
         points = [values for _, values in bearing(loop, trial, choices, first, least_N_m)]
         held = tried(trial, [Query(loop, family.elements(values), first, rungs) for values in points], _TOLERANCE)
         some = zip(points, held, strict=True)

@@ -21,12 +21,12 @@ from haploop.tools.render.units import amount, fixed
 
 _NO_WALL = "none: no wall bears every case"
 _NOTHING_BREAKS = "nothing that was tried"
-# Trials hold force and motion against what is felt, with friction projected on the steps; a run is judged otherwise.
+# Trials compare force and motion with what is felt, with friction projected on the steps; a run is judged differently.
 _SHOWN_AT_END = "; advice_breaks.toml ends with it: its swing and its force there are felt, whatever its verdict"
 _SHOWN_BY_NONE = "; no scene shows it: with friction solved exactly, as in a run, no hand would feel it"
 _FELT, _FELT_BOTH = {True: "force", False: "motion"}, "force and as motion"
 _AT, _TURNS = "at {hz:.0f} Hz", "at no one frequency, turning {turns} times in {within:g} s"
-# A changed limit tells something where it differs by more than how closely it is known.
+# A changed limit tells something if it differs by more than this, which is more than its tolerance.
 _TELLS = 1.2
 _NO_CHANGE, _NO_LOSS = "no single change that was tried gains a fifth", "no single change that was tried costs a sixth"
 _TUNED, _TIMES, _TIMES_ALONE = ", the element tuned anew", "{0}: {1} times", " ({0} without an element)"
@@ -35,7 +35,7 @@ _HAND = "of {0} kg, {1} N s/m and {2} N/m{3}, each 20 % more or less; another ma
 _GRIP = ", holding through a grip of {0} N s/m and {1} N/m"
 _NO_HAND = "none but its force: a hand may make this wall buzz (--hand)"
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
-# What its run adds to "steady", which the search has tried at every hold.
+# What the run of the advised scene adds to "steady"; the search has tried the wall at every hold.
 _SOME_HOLDS = "at some holds of its hand"
 _ADDS = "of advice.toml, haploop run says beside its verdict: {0}"
 _PUSHED = "the pushes of that verdict are at some holds of its hand, the safe wall was tried at all of them"
@@ -113,7 +113,7 @@ def _times(told: Advice, row: Changed) -> str:
 
 
 def assumes(told: Advice, right: Best) -> str:
-    """Describes what is assumed, and how stiff a wall would be were it right."""
+    """Describes what is assumed, and how stiff a wall would be if that were right."""
     it, them = ("it", "it") if len(told.assumed) == 1 else ("they", "each")
     of, half, double = min(told.assumed, key=lambda row: min(row[1].stiffness_N_m, row[2].stiffness_N_m))
     measure = _MEASURE.format(of.key)
@@ -133,13 +133,13 @@ def sentences(told: Advice) -> list[str]:
 
 
 def _kick_N(told: Advice) -> float:
-    """Returns by how much the advised element's force jumps where a count is crossed, from rest; 0 without either."""
+    """Returns by how much the advised element's force jumps when a count is crossed from rest, N; 0 without either."""
     of = one_count(told.scene, installed_kinds()) if told.scene and told.found.advised.values else None
     return sum(of.elements_N) if of else 0.0
 
 
 def describe_run(provisos: Sequence[str]) -> str:
-    """Describes what the verdict of a run of the advised scene says beside its word."""
+    """Describes the provisos in the verdict of a run of the advised scene."""
     told = [proviso for proviso in provisos if proviso != _SOME_HOLDS]
     adds = _ADDS.format(", ".join(told)) if told else ""
     return "; ".join(filter(None, [adds, _PUSHED if _SOME_HOLDS in provisos else ""]))
@@ -168,7 +168,7 @@ def describe(failure: Failure) -> str:
 
 
 def moves(half: Limit, double: Limit, nominal: Limit) -> bool:
-    """Tells whether half or double of an assumed number moves the limit by more than how closely it is known."""
+    """Tells whether halving or doubling an assumed number moves the limit by more than its tolerance."""
     ends = [limit.stiffness_N_m for limit in (half, double)]
     return min(ends) * _TELLS < nominal.stiffness_N_m or max(ends) > _TELLS * nominal.stiffness_N_m
 
@@ -185,7 +185,7 @@ def _elements(told: Advice) -> Table:
 
 
 def format_attacked(told: Advice, best: Best) -> str:
-    """Formats the wall that withstood the attack with an element, or that did not; a dash where none was attacked."""
+    """Formats the wall that withstood the attack with an element, or that did not; a dash if none was attacked."""
     if not (found := told.found.attacked(best)):
         return "–"
     stiffness_N_m, withstood = found
@@ -207,7 +207,7 @@ def _limits(told: Advice) -> Table:
 
 
 def _changes(told: Advice) -> Table:
-    """Returns a row a change: with the element tuned anew, and without one; one column where none is advised."""
+    """Makes a row per change: with the element tuned again, and without one; the latter alone if none is advised."""
     has_element = bool(told.found.advised.values)
     close = f"to {CLOSE * 100:.0f} %"
     heads = (
@@ -226,7 +226,7 @@ def _changes(told: Advice) -> Table:
 
 
 def _factor(factor: float, limit: Limit, base: Limit) -> str:
-    """Formats a factor; "same" where it may be 1, as closely as both limits are known."""
+    """Formats a factor; "same" if it may be 1 within the tolerances of both limits."""
     is_same = limit.stiffness_N_m <= base.fails_N_m and base.stiffness_N_m <= limit.fails_N_m
     return "same" if is_same else fixed(factor, 2)
 
@@ -249,9 +249,9 @@ def format_stiffness(stiffness_N_m: float, digits: int = 3) -> str:
 
 
 def format_limit(limit: Limit) -> str:
-    """Formats a limit, known to two digits: ``over ...`` where no end was found.
+    """Formats a limit to two digits: ``over ...`` if no wall was found that fails.
 
-    It is ``below ...`` where no wall so soft was tried that bears it, and ``none`` where no wall at all does.
+    It is ``below ...`` if no wall that was tried is soft enough to bear all cases, and ``none`` if no wall at all is.
     """
     if not limit.stiffness_N_m:
         return f"below {format_stiffness(limit.fails_N_m, 2)}" if limit.fails_N_m > LEAST_N_M else "none"

@@ -38,7 +38,7 @@ from haploop.tools.advise.withstand import (
     withstand,
 )  # fmt: skip
 
-# What is told while it goes on, the last by the advice.
+# The stages reported while it runs; the last is reported by the advice.
 STAGES = (
     "the wall alone",
     "one element",
@@ -48,9 +48,9 @@ STAGES = (
     "softer walls and the attack",
     "changes of the device",
 )
-# So many of the corners that are hardest on the wall alone take part in that.
+# How many of the corners hardest on the wall alone are added to those of the design.
 _HARDEST = 6
-# So many of each wall's hardest tell what a change would gain.
+# How many of each wall's hardest corners are used to find what a change would gain.
 _TOLD = 2
 
 
@@ -59,17 +59,17 @@ class Found:
     """What the search found.
 
     Attributes:
-        bests: of every family.
+        bests: the best of every family.
         advised: the best of the family to use.
-        stiffness_N_m: that withstood the attack, rounded down; 0 where none does.
-        as_assumed: the best, and how stiff, were every assumed number right; None where nothing is assumed.
-        breaks: the softest wall known not to bear everything, and what it does; None where none was found.
-        cases: how many it was tried in, attack included.
+        stiffness_N_m: the stiffness that withstood the attack, rounded down; 0 if none does.
+        as_assumed: the best, and how stiff, if every assumed number were right; None if nothing is assumed.
+        breaks: the softest wall known not to bear everything, and what it does; None if none was found.
+        cases: how many cases it was tried in, attack included.
         others: elements that bear no wall of ``worth_N_m`` in every corner, a tenth more than the best simple one.
         hidden: elements that render less than their wall, and may hold more than any other.
-        alone_N_m: the wall without an element that withstood as much.
+        alone_N_m: the wall without an element that withstood the attack in the same way.
         hardest: the corners that are hardest on the wall with the element advised, and on that without.
-        fell: what bore more in every corner, and the softest wall, N/m, known not to bear everything with it.
+        fell: elements that bore more in every corner, each with the softest wall, N/m, known not to bear everything.
     """
 
     bests: tuple[Best, ...]
@@ -86,9 +86,9 @@ class Found:
     hardest: tuple[Corner, ...] = ()
 
     def attacked(self, best: Best) -> tuple[float, bool] | None:
-        """Returns the wall, N/m, of one of ``bests`` that withstood the attack, and True, or the softest that did not.
+        """Returns the wall, N/m, of one of ``bests`` that withstood the attack and True, or the softest that did not.
 
-        None where it was not attacked, since another bears more, or as much with fewer elements.
+        None if it was not attacked, since another bears more, or as much with fewer elements.
         """
         if best is self.advised:
             return self.stiffness_N_m, True
@@ -101,7 +101,7 @@ class Found:
 def search(
     loop: Scene, assumed: Sequence[str], trial: Trial, stage: Callable[[str], object] = lambda name: None
 ) -> Found:
-    """Finds the element that bears the stiffest wall in all cases, assumed keys halved and doubled, and how stiff."""
+    """Finds the element that bears the stiffest wall in all cases, assumed keys halved and doubled, and that wall."""
     first = tuple(Case(hold) for hold in FIRST_HOLDS)
 
     def nominal(choices: Sequence[Choice], rungs: tuple[float, ...], least_N_m: float) -> dict[Choice, Limit]:
@@ -156,16 +156,16 @@ def search(
 
 
 def fallen(compared: Sequence[Rival], won: Rival) -> tuple[tuple[Best, float], ...]:
-    """Returns those that more holds or the attack broke on a wall, N/m, which they bear in every corner, but for one.
+    """Returns the losers that more holds or the attack broke on a wall that they bear in every corner; that wall, N/m.
 
-    A stiffer wall that breaks says nothing of that: every limit has one.
+    A stiffer wall that breaks does not count: every limit has one.
     """
     lost = ((each.best, each.broken[0]) for each in compared if each is not won and each.broken)
     return tuple((best, below) for best, below in lost if best.safe and below <= best.safe.stiffness_N_m)
 
 
 def _equals(known: dict[Choice, Limit], family: Family) -> list[Values]:
-    """Returns the parameters whose limits are, as closely as they are known, the largest, from small to large."""
+    """Returns the parameters whose limits are the largest within their tolerance, from small to large."""
     tried = {values: known[family, values].stiffness_N_m for values in _values(known, family)}
     most = max(tried.values())
     return sorted(values for values, stiffness in tried.items() if stiffness >= most / (1.0 + ROUGH))
@@ -178,7 +178,8 @@ def _values(known: dict[Choice, Limit], family: Family) -> list[Values]:
 def worth_trying(known: dict[Choice, Limit], families: Sequence[Family]) -> list[Choice]:
     """Returns the choices of some families that bear a tenth more than the wall alone in the loop as described.
 
-    All of them: what bears most there may bear nothing in a corner in which half of it bears twice the wall alone.
+    All of them: the one that bears most there may bear nothing in a corner in which half its size bears twice the wall
+    alone.
     """
     least_N_m = WORTH * known[NOTHING, ()].stiffness_N_m
     return [choice for choice, limit in known.items() if choice[0] in families and limit.stiffness_N_m > least_N_m]
@@ -192,9 +193,9 @@ def in_corners(
     families: Sequence[Family],
     candidates: Sequence[Choice],
 ) -> list[Best]:
-    """Returns the wall alone and the best of every family, of those among the candidates with limits in all the cases.
+    """Returns the wall alone and the best of every family, chosen among the candidates by their limits in all cases.
 
-    No candidate is tried below what makes it worth having.
+    No candidate is tried with walls too soft to make it worth having.
     """
     alone = known[NOTHING, ()]
 

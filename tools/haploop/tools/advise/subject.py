@@ -52,7 +52,7 @@ _STUCK = (
     "seem safe. Give the friction as it is, in N, or a hand that presses harder (hand.force)."
 )
 
-# How a device file says which of its numbers are assumed.
+# How a device file marks its assumed numbers.
 _MARK = re.compile(r"\bassum(?:ption|ptions|ed)\b[:,]?\s*", re.IGNORECASE)
 _TABLE = re.compile(r"\[+\s*([\w.]+)\s*\]+")
 _VALUE = re.compile(r"([\w]+)\s*=\s*[^#]*(?:#\s*(.*))?$")
@@ -68,7 +68,7 @@ class InvalidRequest(ValueError):
 
 @dataclass(frozen=True)
 class Assumed:
-    """A number that nobody published: its dotted key, and the file's words on it."""
+    """An unpublished number: its dotted key, and what the file says about it."""
 
     key: str
     words: str
@@ -81,7 +81,7 @@ class Subject:
     Attributes:
         scene: resolved; events that change it are taken as done from the start.
         has_task: whether it came with a task of its own; a device alone, without wall and duration, has none.
-        notes: what was taken, one sentence each.
+        notes: what was chosen or left out, one sentence each.
         assumed: numbers of the device that its file assumes and the arguments do not give.
     """
 
@@ -102,7 +102,7 @@ def make_subject(
 ) -> Subject:
     """Makes the scene that the arguments of the command name; elements are those installed where ``kinds`` is None.
 
-    Raises InvalidRequest for a name that is none, SceneError where the scene cannot be run.
+    Raises InvalidRequest for an unknown name, SceneError if the scene cannot be run.
     """
     path = _device(device)
     layers, notes = read_layers(path), []
@@ -142,7 +142,7 @@ def make_subject(
 
 
 def assumptions(path: Path) -> tuple[Assumed, ...]:
-    """Returns the assumed numbers of a device file and of those it extends, of which its own lines take the place."""
+    """Returns the assumed numbers of a device file and of the files it extends, whose lines its own replace."""
     return tuple(found for found in _by_key(path).values() if found.words)
 
 
@@ -189,7 +189,7 @@ def _device(name: str) -> Path:
 
 
 def _lay_hand(layers: Layers, name: str) -> None:
-    """Lays another hand in place of the one there is; the force of its muscles and its place stay."""
+    """Replaces the hand by another; the force of its muscles and its rest position are kept."""
     before = layers.data.pop("hand", None)
     kept = {key: before[key] for key in ("force", "rest") if key in before} if isinstance(before, dict) else {}
     if name == "none":

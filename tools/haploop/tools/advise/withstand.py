@@ -19,19 +19,20 @@ from haploop.tools.linear.linearity import installed_kinds
 
 # How closely limits are found while elements are compared, and that of the one advised.
 ROUGH, _FINE = 0.12, 0.02
-# An element that allows no more than this much beyond a simpler one is not worth having.
+# An element that does not allow more than this many times as much as a simpler one is not worth having.
 WORTH = 1.1
 # Softer walls that have to bear everything, too, as shares of the limit.
 _SOFTER = (0.8, 0.62, 0.48, 0.35, 0.25, 0.15, 0.08, 0.03)
-# A wall that does not withstand the attack is lowered by this, to this share at least.
+# A wall that does not withstand the attack is lowered by this factor, but not below this share.
 _LOWER, _LEAST = 0.97, 0.16
 # Below this share of its limit in every corner, an element is tried in a smaller size.
 _FALLEN = 0.5
-# So much stiffer walls have to withstand it, too: where a count lies in the hold is chance, and differs with each.
+# Walls stiffer by these factors have to withstand it, too: where within a count the hold lies is chance, and differs
+# from wall to wall.
 BEYOND = (1.0, 1.02, 1.04)
-# Times that parameters are moved, each time in the corners that were hardest on those before.
+# How often parameters are moved, each time in the corners that were hardest on the previous ones.
 _MOVES = 3
-# So many of the hardest corners are pushed.
+# How many of the hardest corners are pushed.
 _PUSHED = 3
 _STEADY = ("steady", "no-contact")
 # The softest wall known not to bear everything, and what it does.
@@ -44,8 +45,8 @@ class Best:
 
     Attributes:
         nominal: the limit of the loop as described, at the holds tried first.
-        safe: the limit in every corner, where the family came that far; None where a simpler one bears as much.
-        smaller: the same with no more of any parameter, those that bear most in every corner first.
+        safe: the limit in every corner, if the family came that far; None if a simpler one bears as much.
+        smaller: the same family with no parameter larger, those that bear most in every corner first.
     """
 
     family: Family
@@ -62,10 +63,10 @@ class Rival:
     Attributes:
         bound_N_m: no stiffer wall withstands, as far as is known.
         worth: how many times as much as the others it has to bear.
-        floor_N_m: the wall is not lowered below; None until softer walls were tried.
+        floor_N_m: the wall is not lowered below this; None until softer walls have been tried.
         hardest: corners known to be hard on its walls, the hardest first.
         broke: cases that broke stiffer ones under attack.
-        most: a larger size, whose walls had to be lowered far: parameters are moved to less than that; None without.
+        most: a larger size whose walls had to be lowered far: parameters are moved only below it; None without.
     """
 
     best: Best
@@ -79,9 +80,9 @@ class Rival:
 
 
 def rivals(bests: Sequence[Best], hardest: tuple[Corner, ...] = ()) -> list[Rival]:
-    """Returns every family with a limit in every corner, that which would be advised first.
+    """Returns every family with a limit in every corner, beginning with the one that would be advised.
 
-    One with more elements than that has to bear a tenth more than it. The corners are known to be hard on all of them.
+    One with more elements than that has to bear a tenth more than it. ``hardest`` are corners known to be hard on all.
     """
     first = advised(bests)
     found, worth = [], 1.0
@@ -103,10 +104,10 @@ def advised(bests: Sequence[Best]) -> Best:
 
 
 def withstand(loop: Scene, trial: Trial, some: Sequence[Rival], of: Ranges) -> Rival:
-    """Lowers the walls of rivals until that of the one with the stiffest withstands every attack, and returns that one.
+    """Lowers the walls of rivals until the stiffest of them withstands every attack, and returns its rival.
 
-    Its bound is the stiffness then, 0 where none withstands; others have lower ones. A smaller size of an element joins
-    them once the wall of a larger one had to be lowered far below what it bears in every corner.
+    Its bound is then that stiffness, 0 if none withstands; the others have lower bounds. A smaller size of an element
+    joins the rivals once the wall of a larger one had to be lowered far below what it bears in every corner.
     """
     some = [*some]
     while True:
@@ -145,9 +146,9 @@ def is_less(some: Values, others: Values) -> bool:
 
 
 def _prepare(loop: Scene, trial: Trial, rival: Rival, of: Ranges) -> None:
-    """Moves the parameters of a rival as long as that helps, and tries it at every hold, and softer walls.
+    """Moves the parameters of a rival as long as that helps, then tries it at every hold, and softer walls.
 
-    That is in the corners that are hardest on it, too, before and after.
+    The corners that are hardest on it before and after are included.
     """
     for _ in range(_MOVES):
         values = rival.best.values
@@ -165,7 +166,7 @@ def _prepare(loop: Scene, trial: Trial, rival: Rival, of: Ranges) -> None:
 
 
 def _refine(loop: Scene, trial: Trial, rival: Rival, of: Ranges) -> None:
-    """Moves parameters half a step up or down, as often as that bears more in every corner known to be hard."""
+    """Moves parameters half a step up or down, as long as that bears more in every corner known to be hard."""
     cases = every_case(of, FIRST_HOLDS, rival.hardest)
 
     def found(some: Sequence[Values], rungs: tuple[float, ...]) -> list[tuple[Values, Limit]]:
@@ -220,7 +221,7 @@ def _judged(loop: Scene, wall: Tried, corners: Sequence[Corner]) -> Failure | No
         scene = case.scene(loop)
         assert scene.wall
         scene = replace(scene, wall=replace(scene.wall, stiffness=wall.stiffness_N_m), dissipation=wall.elements)
-        # How hard a wall is hit is told by the taps of the attack: a blow of three times the hold is harder than those.
+        # The taps of the attack test how hard a wall may be hit: a blow of three times the hold is harder than those.
         found = judge_scene(scene, installed_kinds(), blows=())
         if found.word not in _STEADY and not (found.word == "limit-cycle" and not found.felt):
             numbers = found.width_m, found.force_ripple_N, found.frequency_Hz
@@ -230,7 +231,7 @@ def _judged(loop: Scene, wall: Tried, corners: Sequence[Corner]) -> Failure | No
 
 
 def rounded_down(stiffness: float) -> float:
-    """Returns a stiffness rounded down to three digits; of one that begins with 5 or more the last is 0 or 5."""
+    """Returns a stiffness rounded down to three digits; if it begins with 5 or more, the last digit is 0 or 5."""
     if not stiffness:
         return 0.0
     unit = 10.0 ** (math.floor(math.log10(stiffness)) - 2)

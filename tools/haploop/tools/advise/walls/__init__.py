@@ -1,4 +1,4 @@
-"""Walls that are tried: ``cases`` says what one has to bear, ``loops`` moves many at once, ``felt`` tells a buzz,
-``trial`` puts these together, ``store`` remembers, ``limit`` searches the stiffest that bears all,
+"""Trials of walls: ``cases`` says what a wall has to bear, ``loops`` runs many at once, ``felt`` detects a buzz,
+``trial`` combines these, ``store`` keeps the results, ``limit`` searches for the stiffest wall that bears all cases,
 ``rendered`` measures what a hand gets of it.
 """

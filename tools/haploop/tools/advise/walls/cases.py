@@ -15,25 +15,27 @@ from haploop.protocol.scene.scene import Hand, Scene, Wall
 from haploop.tools.advise.walls.corners import Corner, Ranges, corner_words, design, drawn, scale_quantities
 from haploop.tools.render.units import amount
 
-# The device meets the wall at this speed, a firm tap; in an attack by a slow press, and by the fastest tap measured.
+# The device meets the wall at this speed, a firm tap; in an attack also at those of a slow press and of the fastest tap
+# measured.
 TAP_M_S = 0.2
 _SPEEDS = (1e-3, 0.24)
-# The hand presses with this, or with this share of what the actuator can give where that is less: so three times that,
-# swaying, is within what an actuator gives that is a fifth weaker. A hand that presses harder is held by no wall.
+# The hand presses with this force, or with this share of the actuator's largest force if that is less: three times
+# that, with sway, is within reach of an actuator that is a fifth weaker. No wall holds a hand that presses harder.
 PRESS_N, OF_THE_ACTUATOR = 1.0, 0.2
 # Holds as multiples of the task's, and those that are tried first.
 HOLDS = (0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0)
 FIRST_HOLDS = (0.3, 1.0, 3.0)
-# The hand sways by this share of its hold, this often a second, and a run lasts so long.
+# The hand sways by this share of its hold, at this frequency, and a run lasts this long.
 SWAY, SWAY_HZ, LASTS_S = 0.3, 0.5, 2.75
-# A loop that is later than this has no answer in a reasonable time; a run lasts so many round trips at least.
+# With a longer delay than this there is no answer in a reasonable time; a run lasts at least this many round trips.
 MOST_DELAY_S, ROUND_TRIPS = 0.5, 60
-# So does one so many periods of device and hand without a wall, where that swings, being damped by less than this share
-# of the critical; no run is longer than so many usual ones for that.
+# A run also lasts at least this many periods of device and hand without a wall, if they swing, damped by less than this
+# share of critical damping; that makes no run longer than this many usual ones.
 PERIODS, _DAMPED, _SLOWEST = 22, 0.3, 10.0
-# An attack takes so many of the hardest corners whole; of other corners about so many cases, and so many points within.
+# An attack tries all its cases in this many of the hardest corners, about this many cases in other corners, and this
+# many points within.
 _WHOLE, _CORNERS, _POINTS = 6, 280, 160
-# Those take what they are attacked by in steps of this, which has no divisor in common with how many there are.
+# Those take the cases of the attack in steps of this, which has no divisor in common with their number.
 _STRIDE = 17
 
 
@@ -45,7 +47,7 @@ class Case:
         hold: the hand's mean force as a multiple of the task's.
         corner: quantities and what each is multiplied by; empty for the loop as described.
         sway: share of the hold by which the hand sways.
-        sway_Hz: how often.
+        sway_Hz: frequency of the sway.
         tap_m_s: speed at which device and hand meet the wall.
     """
 
@@ -61,9 +63,9 @@ class Case:
         return ", ".join([f"hold x {self.hold:.2g}", *([told] if (told := corner_words(self.corner)) else [])])
 
     def scene(self, loop: Scene, slow: float | None = None) -> Scene:
-        """Returns the scene of this case, with a wall of 1 N/m, made of a loop of ``make_loop``.
+        """Returns the scene of this case, with a wall of 1 N/m, from a loop made by ``make_loop``.
 
-        ``slow`` is the loop's slowness, where it is known.
+        ``slow`` is the loop's slowness, if it is known.
         """
         scene, mean_N = scale_quantities(loop, dict(self.corner)), -self.hold * hold_N(loop)
         slow = slow or slowness(loop)
@@ -79,10 +81,10 @@ class Case:
 
 
 def make_loop(scene: Scene, has_task: bool, share: float = OF_THE_ACTUATOR) -> Scene:
-    """Returns the loop of a resolved scene, of which the cases are made: its hand's force is what the wall then bears.
+    """Returns the loop of a resolved scene from which the cases are made: its hand's force is what the wall then bears.
 
-    That of a task that stays, less what the hand's own spring takes; 1 N without one, or a share of what the actuator
-    gives where that is less.
+    It is the lasting force of the scene's task, less what the hand's own spring takes; without one 1 N, or a share of
+    the actuator's largest force if that is less.
     """
     most_N = value_at(scene, "actuator.saturation")
     force_N = min(PRESS_N, share * (math.inf if most_N is None else most_N))
@@ -101,7 +103,7 @@ def hold_N(loop: Scene) -> float:
 
 
 def slowness(loop: Scene) -> float:
-    """Returns how many times as long as usual everything takes, where the delay is long or the hand swings slowly."""
+    """Returns how many times as long as usual everything takes if the delay is long or the hand swings slowly."""
     chain = Chain.from_scene(loop)
     poles = np.linalg.eigvals(chain.rates()[:, : len(chain.states)].astype(float))
     swinging = [abs(pole) for pole in poles if pole.imag and -pole.real < _DAMPED * abs(pole)]
@@ -118,7 +120,7 @@ def every_case(of: Ranges, holds: Sequence[float] = HOLDS, hardest: Sequence[Cor
 def attack(of: Ranges, hardest: Sequence[Corner] = ()) -> tuple[Case, ...]:
     """Returns cases that the search has not seen: other holds and sways, a hand held still, another approach.
 
-    All of them in the loop as described and in the hardest corners; other corners and points within have a share each.
+    All of them in the loop as described and in the hardest corners; other corners, and points within, get a share each.
     """
     apart, evenly = [0.3 * 10.0 ** (i / 10.0) for i in range(11)], [0.3 + 0.27 * i for i in range(1, 10)]
     some = [Case(hold, sway_Hz=0.3) for hold in evenly]

@@ -10,11 +10,11 @@ from haploop.launch.plan.effects import all_effects
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Scene
 
-# Factors between which what is measured may be other than described, and what a device file assumes.
+# Factors between which measured quantities, and numbers that a device file assumes, may differ from the description.
 TOLERANCE, ASSUMED = (0.8, 1.2), (0.5, 2.0)
 _ENDS = {0.5: "halved", 2.0: "doubled", 0.8: "20 % less", 1.2: "20 % more"}
 DELAY, _DELAY_KEY = "delay", "clock.round_trip_delay"
-# What else is measured, and its key; effects such as a grip and a motor have keys that go with it.
+# What else is measured, and its key; effects such as a grip and a motor have keys that are scaled with it.
 _KEYS = {
     "device mass": "device.mass",
     "hand mass": "hand.mass",
@@ -28,7 +28,7 @@ _KEYS = {
     "actuator force": "actuator.saturation",
     "noise": "noise.deviation",
 }
-# Facts of construction, which no wear and no measurement changes, and what has more numbers than one.
+# Facts of construction, which no wear and no measurement changes, and effects with more than one number.
 _AS_BUILT = {
     "encoder count": "encoder.resolution",
     "force step": "actuator.resolution",
@@ -44,8 +44,8 @@ _WORDS = {key: words for words, key in (_KEYS | _AS_BUILT).items()} | {
     "transmission.motor_damping": "motor damping",
     "friction.breakaway": "breakaway friction",
 }
-# A search takes a regular fraction of the corners: all of so many quantities, each further one as the parity of some of
-# these, so that no two go together (a fractional factorial design of resolution IV; Box, Hunter and Hunter 1978).
+# A search takes a regular fraction of the corners: all of this many quantities, each further one as the parity of some
+# of these, so that no two are confounded (a fractional factorial design of resolution IV; Box, Hunter and Hunter 1978).
 _ALL_OF = 5
 _PARITIES = sorted((mask for mask in range(2**_ALL_OF) if mask.bit_count() in (3, 5)), key=int.bit_count, reverse=True)
 
@@ -57,7 +57,7 @@ Ranges = Mapping[str, tuple[float, float]]
 def ranges(loop: Scene, assumed: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
     """Returns what is uncertain and by which factors: what a user's loop differs in, and the assumed keys.
 
-    Only what is there and not 0; a quantity all of whose keys are assumed is none of its own.
+    Only what exists and is not 0; a quantity whose keys are all assumed does not appear itself.
     """
     found = {DELAY: TOLERANCE} if loop.clock.round_trip_delay and _DELAY_KEY not in assumed else {}
     for name in _KEYS:
@@ -84,7 +84,7 @@ def corner(of: Ranges, number: int) -> Corner:
 def corner_words(some: Corner) -> str:
     """Returns a corner in words: ``halved: cable stiffness; 20 % less: friction, device mass``.
 
-    Of a point within the tolerances: ``within: friction -7 %, delay +3 %``.
+    A point within the tolerances is ``within: friction -7 %, delay +3 %``.
     """
     changed: dict[str, list[str]] = {words: [] for words in _ENDS.values()} | {"within": []}
     for name, factor in some:
@@ -101,7 +101,7 @@ def quantity(name: str) -> str:
 
 
 def design(of: Ranges) -> tuple[Corner, ...]:
-    """Returns the loop as described and every corner, or 32 of more, in which no two of 16 quantities go together."""
+    """Returns the loop as described and every corner, or 32 of more, with no two of 16 quantities confounded."""
     found: list[Corner] = [()]
     for low in range(2 ** min(len(of), _ALL_OF)):
         number = low
@@ -118,9 +118,10 @@ def flipped(of: Ranges, some: Corner) -> list[Corner]:
 
 
 def drawn(of: Ranges, corners: int, points: int) -> list[Corner]:
-    """Returns so many corners, or all where there are no more, and points within, evenly on logarithmic axes.
+    """Returns this many corners, or all if there are no more, and points within, evenly on logarithmic axes.
 
-    A delay is at either end or as described, since loops of one delay run side by side. Each call draws the same.
+    A delay is at either end or as described, since only loops with the same delay run side by side. Each call draws
+    the same.
     """
     random, count = np.random.default_rng(1), 2 ** len(of)
     numbers = range(count) if count <= corners else np.unique(random.integers(count, size=corners)).tolist()
@@ -135,9 +136,9 @@ def drawn(of: Ranges, corners: int, points: int) -> list[Corner]:
 
 
 def scale_quantities(scene: Scene, factors: Mapping[str, float]) -> Scene:
-    """Returns the scene with these quantities, or keys, multiplied; a key goes before the quantity it belongs to.
+    """Returns the scene with these quantities, or keys, multiplied; a key overrides the quantity it belongs to.
 
-    A delay is rounded to whole plant steps, by at least one; what sets in motion is no less than what brakes.
+    A delay changes by whole plant steps, at least one; breakaway friction is no less than kinetic friction.
     """
     for name, factor in factors.items():
         if name in (DELAY, _DELAY_KEY):
@@ -153,7 +154,7 @@ def scale_quantities(scene: Scene, factors: Mapping[str, float]) -> Scene:
 
 
 def delay_s(scene: Scene, factor: float) -> float:
-    """Returns the delay multiplied and rounded to whole plant steps, but not to what it was, s."""
+    """Returns the delay multiplied and rounded to whole plant steps, but not back to what it was, s."""
     rate = scene.clock.plant_rate
     steps = round(scene.clock.round_trip_delay * rate)
     rounded = round(steps * factor)
@@ -163,7 +164,7 @@ def delay_s(scene: Scene, factor: float) -> float:
 
 
 def _keys_of(quantity: str) -> list[str]:
-    """Returns the keys of a quantity; a key is its own."""
+    """Returns the keys of a quantity; a key stands for itself."""
     if quantity not in _KEYS:
         return [quantity]
     return [_KEYS[quantity], *(e.scaled_with[quantity] for e in all_effects() if quantity in e.scaled_with)]

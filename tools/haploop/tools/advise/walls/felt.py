@@ -1,4 +1,4 @@
-"""The test of a buzz: a stretch of a run goes to and fro, and a hand feels that, by its motion or by its force."""
+"""The test for a buzz: a stretch of a run goes to and fro, and a hand feels that as motion or as force."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from haploop.logger.verdict.ripple import RIPPLE_ABOVE_HZ
 from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.scene import Scene
 
-# So many turns within a stretch are a buzz; what only follows a hand that sways turns once.
+# This many turns within a stretch are a buzz; a device that only follows a swaying hand turns once.
 TURNS = 4
-# A line holds so much of the power, at least; that between two frequencies of the spectrum four fifths of its own.
+# A line holds at least this share of the power; one between two frequencies of the spectrum has four fifths of its own.
 _LINE = 0.5
 # Turns of less than this are rounding: an atom is as wide.
 _LEAST_M = 1e-10
@@ -28,13 +28,13 @@ class Buzz(NamedTuple):
 
     Attributes:
         turns: times that the measured position (the true one without an encoder) changed its direction.
-        motion_m, force_N: what position and command swing by, peak to peak, see ``ripple``; 0 where it does not go to
-            and fro.
-        frequency_Hz: of whichever is felt more.
-        times_felt: the larger of both as a multiple of what is felt; 0 where it does not go to and fro.
+        motion_m, force_N: swing of position and of command, peak to peak, see ``ripple``; 0 if it does not go to and
+            fro.
+        frequency_Hz: frequency of whichever is felt more.
+        times_felt: the larger of both as a multiple of what is felt; 0 if it does not go to and fro.
         by_force: whether that is the force.
         other_felt: the smaller of both as such a multiple.
-        is_line: whether half of what is felt more lies at that frequency: else it has none.
+        is_line: whether half of what is felt more lies at that frequency; otherwise it has no one frequency.
     """
 
     turns: np.ndarray
@@ -53,8 +53,8 @@ def felt_m(frequency_Hz: np.ndarray) -> np.ndarray:
 
 
 def felt_force_N(scene: Scene) -> Threshold:
-    """Makes the threshold of the force: a command that would move device and hand, were there no friction, so far that
-    it is felt. |F| = felt / |x / F|, with x / F of the scene's own chain of bodies at the encoder.
+    """Makes the threshold of the force: the command that would move device and hand, without friction, just far enough
+    to be felt. |F| = felt / |x / F|, with x / F of the scene's own chain of bodies at the encoder.
 
     No threshold of force is published for a stylus; this is that of the motion, taken through the device.
     """
@@ -90,7 +90,7 @@ def buzz(x: np.ndarray, measured: np.ndarray, command: np.ndarray, rate: float, 
 
 
 def _turns(u: np.ndarray) -> np.ndarray:
-    """Counts the changes of direction of each column; steps of less than rounding are none."""
+    """Counts the changes of direction of each column; steps smaller than rounding do not count."""
     move = np.diff(u, axis=0)
     direction = np.where(np.abs(move) > _LEAST_M, np.sign(move), 0.0)
     rows = np.arange(len(direction))[:, None]
@@ -100,11 +100,11 @@ def _turns(u: np.ndarray) -> np.ndarray:
 
 
 def ripple(u: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns what each column swings by, peak to peak, faster than ``TURNS`` turns a stretch, and how fast in Hz.
+    """Returns the swing of each column, peak to peak, faster than ``TURNS`` turns a stretch, and its frequency in Hz.
 
-    The third is the share of its power at that frequency and those beside it: little of spikes and of noise.
+    The third is the share of its power at that frequency and those beside it, which is small for spikes and noise.
 
-    The column's parabola is taken off first: a hand that sways would leave steps at the ends.
+    The column's parabola is removed first: a hand that sways would leave steps at the ends.
     """
     u = np.where(np.isfinite(u).all(axis=0), u, 0.0)
     parabolas = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, len(u)), 3))[0]

@@ -11,7 +11,7 @@ from haploop.tools.advise.walls.cases import Case
 from haploop.tools.advise.walls.store import Failure, Job, Tried
 from haploop.tools.advise.walls.trial import Trial
 
-# No wall softer than the first is a wall; no device renders one stiffer than the second.
+# Anything softer than the first is not taken for a wall; no device renders one stiffer than the second.
 LEAST_N_M, MOST_N_M = 1.0, 1e6
 # Walls that are tried between one that bears all and one that does not, in every round.
 _BETWEEN = 3
@@ -19,11 +19,11 @@ _BETWEEN = 3
 
 @dataclass(frozen=True)
 class Query:
-    """A loop with elements whose limit is searched.
+    """A loop with elements whose limit is searched for.
 
     Attributes:
         ladder: stiffnesses in N/m that are tried first, rising.
-        least_N_m: where a wall so soft fails, the search ends: how much softer the limit is does not matter.
+        least_N_m: if a wall this soft fails, the search ends: how much softer the limit is does not matter.
     """
 
     loop: Scene
@@ -38,11 +38,11 @@ class Limit:
     """The limit of a wall's stiffness.
 
     Attributes:
-        stiffness_N_m: the largest that bears all cases, as do all softer ones that were tried; 0 where none does, or
+        stiffness_N_m: the largest that bears all cases, as do all softer ones that were tried; 0 if none does, or
             none as stiff as asked for.
-        fails_N_m: the softest that does not; infinite where none was found.
+        fails_N_m: the softest that does not; infinite if none was found.
         failure: what that one does.
-        borne_above_N_m: stiffer ones that bear all cases all the same.
+        borne_above_N_m: stiffer ones that nevertheless bear all cases.
     """
 
     stiffness_N_m: float

@@ -20,9 +20,9 @@ from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.protocol.ticks import Timebase
 
 Kinds = Mapping[str, type[Element]]
-# Elements without a memory and their parameter, of which 0 is no element: walls with any of them move as one array.
+# Elements without a memory and their parameter, where 0 means no element: walls with any of them move as one array.
 _PLAIN = {"damping": "damping", "bidirectional-inertia": "mass", "unidirectional-inertia": "mass"}
-# Of a scene, what no motion of bodies depends on.
+# The parts of a scene that the motion of its bodies does not depend on.
 _OF_A_WALL = ("title", "seed", "wall", "dissipation")
 
 
@@ -32,8 +32,8 @@ class Seen(NamedTuple):
     Attributes:
         x: position of the body with the encoder, m.
         measured: the same as the controller reads it, m.
-        command: N.
-        gone: whether a member is beyond the scene's limit, or no number, shape (members,).
+        command: the command, N.
+        gone: whether a member is beyond the scene's limit, or not a number, shape (members,).
     """
 
     x: np.ndarray
@@ -71,12 +71,12 @@ class Loops(BatchLoop):
         return Seen(x, measured, command, np.asarray(gone))
 
     def select(self, kept: np.ndarray) -> None:
-        """Goes on with these members alone, a truth value of each."""
+        """Continues with these members alone; ``kept`` has a truth value for each."""
         self._select(kept)
 
 
 class LoneLoop:
-    """One loop that arrays cannot move, by the plant and the controller of a run; used as ``Loops`` is."""
+    """One loop that cannot run in arrays, with the plant and the controller of a run; used as ``Loops`` is."""
 
     def __init__(self, scene: Scene, kinds: Kinds) -> None:
         self._time = Timebase.from_scene(scene)
@@ -95,7 +95,7 @@ class LoneLoop:
         return Seen(shown, measured, command, np.array([self._plant.stop_reason is not None]))
 
     def select(self, kept: np.ndarray) -> None:
-        """Has no others to leave out."""
+        """Does nothing: there are no other members to leave out."""
 
 
 def is_plain(elements: Sequence[ElementTable]) -> bool:
@@ -124,7 +124,7 @@ def _shape(scene: Scene) -> Scene:
 
 
 def _alike(scenes: Sequence[Scene]) -> list[Scene]:
-    """Returns the scenes of a group with the same plain elements, of which some do nothing: forces keep their bits."""
+    """Returns the scenes of a group with the same plain elements, some of which do nothing: forces keep their bits."""
     names = [name for name in _PLAIN if any(each.name == name for scene in scenes for each in scene.dissipation)]
     if not names or not is_plain(scenes[0].dissipation):
         return list(scenes)

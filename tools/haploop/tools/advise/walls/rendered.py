@@ -17,7 +17,7 @@ from haploop.tools.advise.walls.store import Failure
 from haploop.tools.advise.walls.trial import FROM_S, STRETCH_S, Trial
 from haploop.tools.linear.linearity import installed_kinds
 
-# A wall of which less than this share is rendered is hidden by its element: softer ones are measured, too.
+# If less than this share of a wall is rendered, its element hides it: softer walls are measured, too.
 _HIDDEN, _HALVINGS = 0.5, 16
 
 
@@ -25,8 +25,8 @@ class Rendered(NamedTuple):
     """What a wall renders, over all cases of a query; 0 throughout where no wall is safe.
 
     Attributes:
-        held_N_m: mean force over mean penetration as it is measured, from 0.75 s on; the force is the one that acts, a
-            delay later.
+        held_N_m: mean force over mean measured penetration, from 0.75 s on; the force is the one in effect, a delay
+            later.
         contact_N_m: slope of the same force over the true penetration, by least squares, on the first way in.
         ripple_N: largest peak to peak of the command above 30 Hz in a quarter of a second, mean of the cases.
         extra_N, extra_rms_N: largest and root mean square force of the elements.
@@ -40,11 +40,11 @@ class Rendered(NamedTuple):
 
 
 class Trying(NamedTuple):
-    """The wall of which most is rendered, of those that bear everything.
+    """The wall that renders most, among those that bear everything.
 
     Attributes:
-        limit_N_m: the stiffest that does; 0 where none does.
-        wall_N_m: the one measured, the same but where the element hides it.
+        limit_N_m: the stiffest that bears everything; 0 if none does.
+        wall_N_m: the one that was measured; the same unless the element hides it.
     """
 
     limit_N_m: float
@@ -76,7 +76,7 @@ def rendered(queries: Sequence[Query], stiffnesses_N_m: Sequence[float]) -> list
 
 
 def tried(trial: Trial, queries: Sequence[Query], tolerance: float) -> list[Trying]:
-    """Finds the limit of each query, and measures what is rendered there; of a hidden wall, softer ones, too."""
+    """Finds the limit of each query, and measures what is rendered there; for a hidden wall, softer ones, too."""
     found = limits(trial, queries, tolerance)
     best = [(limit.stiffness_N_m, each) for limit, each in zip(
         found, rendered(queries, [limit.stiffness_N_m for limit in found]), strict=True)]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Results of walls that were tried, kept in a readable file so that an interrupted advice goes on."""
+"""Results of walls that were tried, kept in a readable file so that an interrupted advice can be continued."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class Failure:
     """What a wall does in the case that it does not bear.
 
     Attributes:
-        case: in words; or why it cannot be told, with a frequency of 0.
+        case: the case in words; or why it cannot be told, with a frequency of 0.
         at_s: end of the stretch in which it was seen.
-        gone: whether the device left its limits; the numbers are of no meaning then.
-        motion_m, force_N, frequency_Hz, times_felt, by_force: of that stretch, as of ``Buzz``.
+        gone: whether the device left its limits; the numbers then mean nothing.
+        motion_m, force_N, frequency_Hz, times_felt, by_force: of that stretch, as in ``Buzz``.
         tried: the case; None where it cannot be told.
-        other_felt, is_line, turns: as of ``Buzz``; turns are 0 where they were not counted.
+        other_felt, is_line, turns: as in ``Buzz``; turns are 0 where they were not counted.
         within_s: how long the stretch is.
     """
 
@@ -54,7 +54,7 @@ class Failure:
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any]) -> Self:
-        """Makes it from what ``dataclasses.asdict`` and JSON have made of it; TypeError where it is none."""
+        """Makes it from its form in JSON, by way of ``dataclasses.asdict``; raises TypeError for anything else."""
         case = data.get("tried")
         tried = case and Case(**{**case, "corner": tuple((str(name), factor) for name, factor in case["corner"])})
         return cls(**{**data, "tried": tried})
@@ -69,7 +69,7 @@ class Job:
     cases: tuple[Case, ...]
 
     def as_told(self) -> dict[str, Any]:
-        """Returns what is tried of its first wall, to be read; a loop is told by digits that another does not have."""
+        """Returns a readable account of what is tried of its first wall; a loop is identified by digits of its hash."""
         wall = self.walls[0]
         return {
             "wall_N_m": float(f"{wall.stiffness_N_m:.4g}"),
@@ -81,10 +81,10 @@ class Job:
 
 
 class Store:
-    """Failures of walls, or None, by a key that has everything in it that decides: a changed scene finds nothing.
+    """Failures of walls, or None, by a key made of everything that decides them: a changed scene finds nothing.
 
-    A JSON object a line in a file, so that an interrupted advice goes on; several may add to one file. What is no such
-    line, as after a kill or on a full disk, is passed over, and its wall tried again.
+    They are kept in a file, one JSON object per line, so that an interrupted advice can be continued; several may add
+    to one file. A broken line, as after a kill or on a full disk, is skipped, and its wall tried again.
 
     Args:
         file: JSON lines, read and added to; None keeps nothing.
@@ -109,7 +109,7 @@ class Store:
         return _digest(repr((self._version, loop, wall, tuple(cases))))
 
     def add(self, results: Mapping[str, Failure | None], jobs: Mapping[str, Job]) -> None:
-        """Keeps results by their keys, on disk at once, whole lines after whatever is there; of each what was tried."""
+        """Keeps results by their keys, with what was tried for each, on disk at once, as whole lines at the end."""
         self.known |= results
         if not self._file:
             return

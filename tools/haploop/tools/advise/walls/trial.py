@@ -1,4 +1,4 @@
-"""The trial of walls: each with an element, in many cases at once, until one of them buzzes; and what came of it."""
+"""The trial of walls: each with an element, in many cases at once, until one of them buzzes; and the results."""
 
 from __future__ import annotations
 
@@ -18,27 +18,28 @@ from haploop.tools.advise.walls.store import Failure, Job, Store, Tried
 from haploop.tools.executor.executors import Executor, InlineExecutor, make_executor, map_parallel
 from haploop.tools.linear.linearity import installed_kinds
 
-# Stretches in which a run is looked at, and when the first one begins: what the tap has left is gone by then, or dies.
+# Length of the stretches in which a run is examined, s, and when the first one begins: by then what the tap caused is
+# gone, or is dying away.
 STRETCH_S, FROM_S = 0.25, 0.75
-# A stretch of a swing that dies is this share of the one before at most; what then still dies is watched so many times
-# as long.
+# A swing dies away if each stretch is at most this share of the one before; what then is still dying is watched this
+# many times as long.
 _DYING, _LONGER = 0.8, 4
-# The failure of a wall of which no case tells anything.
+# The failure of a wall about which no case tells anything.
 _NO_CONTACT = "cannot be told: in no case is the device still at the wall after {0:g} s"
 # Members that are worth a worker of their own.
 _PART = 150
 
 
 class Trial:
-    """Tries walls, on several cores where that is worth it, and remembers what came of them; a context manager.
+    """Tries walls, on several cores where that is worth it, and remembers the results; a context manager.
 
     Args:
         store: results of an earlier, interrupted advice, and where to keep these.
-        workers: processes; one a core when None.
+        workers: number of processes; one per core when None.
         on_progress: called with the number of runs so far.
 
     Attributes:
-        runs: loops that were moved.
+        runs: number of loops that were run.
     """
 
     def __init__(
@@ -94,7 +95,7 @@ class Trial:
 def run_jobs(jobs: Sequence[Job]) -> list[Failure | None]:
     """Tries one wall of each job in all its cases, with loops that are equally slow.
 
-    A wall that fails leaves the arrays with all its cases.
+    A wall that fails is removed from the arrays with all its cases.
     """
     slow = slowness(jobs[0].loop)
     made: dict[tuple[int, Case], Scene] = {}
@@ -123,7 +124,7 @@ def _watch(
     jobs: Sequence[Job], loops: Loops | LoneLoop, members: list[tuple[int, int]], failed: dict[int, Failure],
     touched: set[int], thresholds: Mapping[int, Threshold],
 ) -> None:  # fmt: skip
-    """Follows loops to their end, or until every wall among them has failed; adds those at which one still is."""
+    """Follows loops to their end, or until every wall among them has failed; notes failed walls and touched ones."""
     rate, late = jobs[0].loop.clock.control_rate, slowness(jobs[0].loop)
 
     def felt_N(frequency_Hz: np.ndarray) -> np.ndarray:
