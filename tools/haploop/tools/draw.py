@@ -1,4 +1,4 @@
-"""The figure of whatever is to be drawn: a run, several over one another, or the map of a sweep."""
+"""The figure of whatever is to be drawn: a run, several runs over one another, or the map of a sweep."""
 
 from __future__ import annotations
 

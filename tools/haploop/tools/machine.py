@@ -35,7 +35,7 @@ def versions() -> dict[str, str]:
 
 
 def commit() -> str:
-    """Returns the commit of these sources' checkout, ``+changes`` where they differ from it; "" outside of one."""
+    """Returns the commit of these sources' checkout, with ``+changes`` if they differ from it; "" outside of one."""
     try:
         _git("ls-files", "--error-unmatch", Path(__file__).name)
         changed = _git("status", "--porcelain", "--untracked-files=no", "--", *(f":/{root}" for root in _ROOTS))
@@ -52,7 +52,7 @@ def _git(*words: str) -> str:
 def source_digest(packages: Iterable[str], files: Iterable[Path] = ()) -> str:
     """Returns a hash of the Python sources of some packages, and of some files.
 
-    Unlike the commit it stands still when only the documentation changes, and moves when sources are edited.
+    Unlike the commit it stays the same when only the documentation changes, and differs when sources are edited.
     """
     digest = hashlib.sha256()
     for package in packages:

@@ -40,7 +40,7 @@ class Output(TypedDict, total=False):
 
 
 def run_cells(cells: Sequence[Cell]) -> None:
-    """Runs every code cell of a notebook of format 4 and replaces its outputs. Where one raises, throw it away."""
+    """Runs every code cell of a notebook of format 4 and replaces its outputs. If one raises, discard the notebook."""
     import matplotlib
 
     matplotlib.use("Agg")

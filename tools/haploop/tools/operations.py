@@ -31,7 +31,7 @@ Kinds = dict[str, type["Element"]]
 WHOLE, AGAIN, NONE = "all effects", "all effects again", "no effect"
 # Exchanges that are left out, since they build caches, and exchanges that are counted.
 _FIRST, _COUNTED = 20, 101
-# A number of tools that nobody else has: a debugger, coverage and a profiler are 0 to 2.
+# A tool number of ``sys.monitoring`` that nothing else has: a debugger, coverage and a profiler are 0 to 2.
 _TOOL = 3
 
 
@@ -58,7 +58,7 @@ class _Counter:
     def __enter__(self) -> Self:
         self._before = sys.gettrace()
         if sys.version_info >= (3, 12):
-            # A trace function would count what it has seen before otherwise than what it has not.
+            # A trace function would count code that it has seen before differently from new code.
             events = sys.monitoring
             events.use_tool_id(_TOOL, "haploop")
             events.register_callback(_TOOL, events.events.INSTRUCTION, self._note)
@@ -97,7 +97,7 @@ def operations(scene: Scene, kinds: Kinds) -> Operations:
     A shorter run is counted over its second half.
     """
     time = Timebase.from_scene(scene)
-    with WhereItPays.none():  # which has no instructions
+    with WhereItPays.none():  # machine code has no bytecode instructions
         plant, controller = Plant(scene, time), Controller(scene, time, kinds)
     counter = _Counter()
     counts: list[tuple[int, int]] = []

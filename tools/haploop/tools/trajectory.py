@@ -1,4 +1,4 @@
-"""A run in one process, of which the motion at ticks is kept beside the summary."""
+"""A run in one process that keeps the motion at ticks besides the summary."""
 
 from __future__ import annotations
 

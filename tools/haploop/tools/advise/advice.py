@@ -237,7 +237,7 @@ def is_ideal(loop: Scene) -> bool:
 
 
 def advised_scene(subject: Subject, loop: Scene, found: Found) -> Scene | None:
-    """Returns the scene of the advised wall and its element, titled an upper bound if it is one; None without a wall."""
+    """Returns the scene of the advised wall and its element, titled an upper bound if it is one; None on no wall."""
     return _shown(subject, loop, found, found.stiffness_N_m, Case(1.0), "upper bound, " if is_ideal(loop) else "")
 
 

@@ -93,7 +93,7 @@ def _output(out: Path | None, asked: Subject) -> Path:
 
 
 def breaks_words(found: Advice) -> str:
-    """Returns what the scene of the case that breaks first shows; its wall may be stiffer than the one told to break."""
+    """Returns what the scene of the case that breaks first shows; its wall may be stiffer than the reported one."""
     scene, broken = found.breaks, found.found.breaks
     assert scene
     assert scene.wall

@@ -156,9 +156,9 @@ def search(
 
 
 def fallen(compared: Sequence[Rival], won: Rival) -> tuple[tuple[Best, float], ...]:
-    """Returns the losers that more holds or the attack broke on a wall that they bear in every corner; that wall, N/m.
+    """Returns the rivals but the winner that more holds or the attack broke on a wall which they bear in every corner.
 
-    A stiffer wall that breaks does not count: every limit has one.
+    Each comes with that wall, N/m. A stiffer wall that breaks does not count: every limit has one.
     """
     lost = ((each.best, each.broken[0]) for each in compared if each is not won and each.broken)
     return tuple((best, below) for best, below in lost if best.safe and below <= best.safe.stiffness_N_m)

@@ -65,7 +65,7 @@ def attach_logger(run_id: str | Elsewhere | None, out: Path | None) -> None:
 
 
 def _log(run: LiveRun, context: SecureContext, directory: Path, received: list[int]) -> Summary:
-    """Logs until the run ends or a signal comes, and returns the summary; leaves where no telemetry came."""
+    """Logs until the run ends or a signal comes, and returns the summary; exits if no telemetry came."""
 
     def reason_to_leave() -> str | None:
         if received:

@@ -1,4 +1,4 @@
-"""The present state of an observed run: the newest of everything that was received of it."""
+"""The present state of an observed run: the newest message of each kind that was received from it."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class LiveStatus:
         tick: every tick before this one has been received.
         factor: simulated over wall time of the last 2 s; None while nothing moves.
         changes: every event so far, (tick, event) in order.
-        skipped_ticks: telemetry that never came.
+        skipped_ticks: ticks whose telemetry never came.
         figures: verdict, oscillation_m, residual_J and balance so far, in the end those of the summary; empty before
             any.
         is_judged: whether the verdict is that of the ended run, held still and pushed.
-        is_awaited: whether its launcher still is to judge it.
+        is_awaited: whether its launcher has yet to judge it.
         ended: how the run ended, in a word; "" while it goes on.
         why: a sentence on that; "" for none.
     """

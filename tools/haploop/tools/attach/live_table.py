@@ -143,7 +143,7 @@ def attach_print(run_id: str | Elsewhere | None) -> None:
 
 
 def _await_verdict(run: LiveStatus, live_run: LiveRun, observed: ObservedRun) -> None:
-    """Waits until the launcher of a run that has ended has judged it; where it goes without, what was seen stands."""
+    """Waits until the launcher of an ended run has judged it; if it exits without a verdict, what was seen stands."""
     is_there = True
     while run.is_awaited and is_there:
         time.sleep(_DRAWN_S)

@@ -1,12 +1,12 @@
-"""``haploop attach plotjuggler``: publishes every sample of one run after the other for PlotJuggler's ZMQ subscriber.
+"""``haploop attach plotjuggler``: publishes every sample of one run after another for PlotJuggler's ZMQ subscriber.
 
 A message is two frames, a topic and a msgpack array of samples with their own time.
 
-PlotJuggler reads them (its plugin DataStreamZMQ and its msgpack parser, from version 3.16 on) so: each map of the array
-is a point of the series ``topic/name`` for every number in it, at the time in the field that its user has named
-(``timestamp``, s). One map without that field would put its topic on the time of arrival for good, so every map
-has it. A third frame is never sent: it would be one time for the whole message, and 3.16 and 3.17 read such a message
-after its memory was given back (PlotJuggler #1416).
+PlotJuggler (its plugin DataStreamZMQ and its msgpack parser, from version 3.16 on) reads them as follows: each map of
+the array is a point of the series ``topic/name`` for every number in it, at the time in the field that its user has
+named (``timestamp``, s). One map without that field would switch its topic to the time of arrival for good, so every
+map has it. A third frame is never sent: it would be one time for the whole message, and 3.16 and 3.17 read such a
+message after its memory was freed (PlotJuggler #1416).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ PORT = 9872
 # Samples in one message at most, and messages kept for a viewer that does not read: together they bound the memory.
 MOST_SAMPLES = 1000
 _KEPT_MESSAGES = 500
-# Subscriptions taken per call, so that a peer who floods the socket cannot hold the others up.
+# Subscriptions taken per call, so that a peer that floods the socket cannot hold the others up.
 _AT_ONCE = 200
 
 
@@ -163,7 +163,7 @@ def attach_plotjuggler(run_id: str | Elsewhere | None, port: int) -> None:
 
 
 def publish(run: LiveRun, outlet: Outlet) -> None:
-    """Publishes a run from its present tick to its end; RunNotFound after that, Refused where it lets no node join."""
+    """Publishes a run from its present tick to its end; raises RunNotFound after that, Refused if no node may join."""
     with ObservedRun(run, ROLE) as observed:
         print(f"run {run.id}: {run.title}", file=sys.stderr)
         stream = SampleStream(Timebase(**observed.observer.welcome["timebase"]))

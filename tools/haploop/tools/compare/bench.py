@@ -19,46 +19,48 @@ from haploop.tools.advise.walls.store import Store
 from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.compare.conditions import draw
 
-# How closely limits are found while parameters are compared, and then.
+# How closely limits are found while parameters are compared, and afterwards.
 _ROUGH, _CLOSE = 0.25, 0.08
-# Rungs as multiples of the wall without any element, the same for all, so that those who bear the same get the same.
+# Rungs as multiples of the wall without any element, the same for all, so that those that bear the same get the same.
 _RUNGS = ladder(1.7**-2, 1.7**2, 1.7)
-# The share of a box's logarithmic axes that is searched through the best.
+# The share of the length of a box's logarithmic axes that is searched through the best point.
 _ALONG = 0.6
-# The first parameters of all, about none, are this share of the smallest of the box.
+# The very first parameters, almost no element, are this share of the smallest of the box.
 _NONE = 1.0 / 16.0
-# Every round of the tuning has seeds of its own, from this, twice and three times this on.
+# Every round of the tuning has seeds of its own, starting at this, at twice and at three times this number.
 _TUNING = 1000
-# What is 20 % off, together, to tell how sensitive the wall is to the device.
+# What is changed by 20 %, all together, to show how sensitive the wall is to the device.
 _DEVICE = ("device.mass", "device.damping", "friction.kinetic", "transmission.stiffness")
 OFF = (0.8, 1.2)
 
 Ends = tuple[float, float]
-# Of some block, these parameters.
+# A block of seeds, and parameters for it.
 Choice = tuple[int, Values]
 
 
 class Shown(NamedTuple):
-    """What comes of parameters under each seed: held stiffness, N/m, and the element's own force, r.m.s., N."""
+    """The result of parameters under each seed: held stiffness, N/m, and the element's own force, r.m.s., N."""
 
     held_N_m: np.ndarray
     force_N: np.ndarray
 
 
-# What choices show in a round of the tuning, under so many seeds.
+# From choices, a round of the tuning and a number of seeds to what the choices show.
 Shows = Callable[[Sequence[Choice], int, int], dict[Choice, Shown]]
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is spent on every stabilizer alike; each seed draws ``of_seed`` conditions.
+    """The effort spent on every stabilizer alike; each seed draws ``of_seed`` conditions.
 
     Attributes:
-        points: parameters tried over the whole box by ``first`` seeds, the smallest of all beside them.
-        finalists: so many of them go on, with ``around`` more along the axes through the best, by ``tuning`` seeds.
-        last: seeds by which the best as many of these, and where the search began, are tried, to see what few break.
-        seeds: try the best one.
-        moved: of these also try it with all parameters, and the device, 20 % off.
+        points: how many parameters are tried over the whole box, besides the smallest of all, under ``first`` seeds.
+        finalists: how many of them are tried further, with ``around`` more along the axes through the best, under
+            ``tuning`` seeds.
+        last: seeds under which the best of these, again ``finalists``, and the start of the search are tried, to find
+            out which of them a few seeds break.
+        seeds: seeds under which the best one is tried.
+        moved: how many of these also try it with all parameters, and with the device, 20 % off.
     """
 
     points: int = 12
@@ -72,7 +74,7 @@ class Effort:
     of_seed: int = 3
 
 
-# Where the parameters of a like loop are known, the search begins and ends about them.
+# If the parameters for a similar loop are known, the search begins and ends around them.
 BESIDE = Effort(points=0, tuning=3, last=12, seeds=16, moved=0)
 
 
@@ -81,9 +83,9 @@ class Job:
     """A stabilizer to be tuned and tried.
 
     Attributes:
-        alone_N_m: about the stiffest wall without any.
-        starts: blocks of seeds that it is tuned and tried by, each for itself, since blocks share none; and the
-            parameters from which each begins, None for the whole box.
+        alone_N_m: roughly the stiffest wall without any.
+        starts: blocks of seeds with which it is tuned and tried, each block separately, since they share no seeds; and
+            the parameters from which each begins, None for the whole box.
     """
 
     loop: Scene
@@ -100,8 +102,9 @@ class Row:
     Attributes:
         values: the parameters of the tuning, in the order of the family.
         at_edge: the parameters within a twentieth of the end of their search, and "wall" where no stiffest was found.
-        seeds: what came of each seed with those parameters.
-        parameter, device: the held stiffness with all parameters, or the device, 20 % less and more, over that without.
+        seeds: the result of each seed with those parameters.
+        parameter, device: the held stiffness with all parameters, or the device, 20 % less and more, over that without
+            the change.
     """
 
     family: str
@@ -118,14 +121,14 @@ def family_of(name: str) -> Family:
 
 
 def alone(loop: Scene) -> float:
-    """Returns about the stiffest wall that bears a few conditions without any element, N/m; 10 at least."""
+    """Returns roughly the stiffest wall that bears a few conditions without any element, N/m; 10 at least."""
     query = Query(loop, (), draw(ranges(loop), 0, 0, 6), ladder(10.0, 1e5, 1.6))
     with Trial(Store(), 1) as trial:
         return max(10.0 * LEAST_N_M, limits(trial, [query], _ROUGH)[0].stiffness_N_m)
 
 
 def bench(job: Job) -> tuple[Row, ...]:
-    """Tunes and tries one stabilizer by every block of seeds, side by side."""
+    """Tunes and tries one stabilizer under every block of seeds, side by side."""
     loop, family, effort = job.loop, family_of(job.family), job.effort
     of, ends = ranges(loop), box(family, loop, job.alone_N_m)
     rungs = tuple(job.alone_N_m * times for times in _RUNGS)
@@ -160,16 +163,18 @@ def bench(job: Job) -> tuple[Row, ...]:
 
 
 def _shares(as_is: Sequence[Trying], moved: Sequence[Trying], count: int) -> tuple[float, ...]:
-    """Returns what is held when something is moved over what is held without, for each so many seeds."""
+    """Returns what is held with each change over what is held without it, over ``count`` seeds each."""
     base = sum(each.rendered.held_N_m for each in as_is[:count])
     sums = [sum(each.rendered.held_N_m for each in moved[at : at + count]) for at in range(0, len(moved), count or 1)]
     return tuple(each / base if base else 0.0 for each in sums)
 
 
 def _tuned(shows: Shows, ends: Sequence[Ends], job: Job) -> dict[int, Values]:
-    """Returns what renders most in each block: of some over the whole box; of the best of them, and others along the
-    axes through the best; of the best of these, and where the search began: the smallest of all parameters, which are
-    about none, or those of a like loop. Of what then holds as much it is what adds the least force.
+    """Returns the parameters that render most in each block, by three rounds of trials.
+
+    Tried are points over the whole box; then the best of them and others along the axes through the best; then the best
+    of these and the start of the search: the smallest of all parameters, almost no element, or those for a similar
+    loop. Of those that then hold as much, the ones that add the least force are returned.
     """
     if not ends:
         return {block: () for block, _ in job.starts}
@@ -204,7 +209,7 @@ def gentlest(known: Mapping[Values, Shown]) -> Values:
 
 
 def along(best: Values, ends: Sequence[Ends], share: float, count: int) -> list[Values]:
-    """Returns so many points on the axes through the best, over this share of an axis's length, to two digits."""
+    """Returns ``count`` points on the axes through the best, over this share of an axis's length, to two digits."""
     points, count = list[Values](), count // len(ends)
     for axis, (value, (low, high)) in enumerate(zip(best, ends, strict=True)):
         wide = (high / low) ** (share / 2.0)

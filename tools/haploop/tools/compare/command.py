@@ -61,7 +61,7 @@ def compare(
 
     How stiff a wall it renders safely, what it costs, where it breaks.
 
-    Can be stopped; the same command with --out DIR, the directory of the first, goes on.
+    It can be stopped; the same command with --out DIR, the directory of the first, continues it.
     """
     from haploop.tools.advise.subject import InvalidRequest, make_subject
     from haploop.tools.command.given import kinds_with
@@ -79,7 +79,7 @@ def compare(
 
 
 def find(subject: Subject, grid: bool, workers: int | None, rows: Path) -> Comparison:
-    """Compares the stabilizers on a subject's loop, with ``grid`` on others like it; ``rows`` keeps what was found."""
+    """Compares the stabilizers on a subject's loop, and with ``grid`` on others like it; ``rows`` keeps the results."""
     from haploop.tools.advise.families import FORCE_BOUNDING
     from haploop.tools.advise.report import format_stiffness
     from haploop.tools.advise.walls.cases import make_loop

@@ -1,4 +1,4 @@
-"""The comparison of all stabilizers on a loop and on some like it: what is asked, kept on disk, and found."""
+"""The comparison of all stabilizers on a loop and on similar ones: what is asked, kept on disk, and found."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from haploop.tools.executor.executors import Executor
 from haploop.tools.render.progress import Stage
 
 DESCRIBED = "as described"
-# Seeds that are told, and those that rankings are held against: tuning and trial have others.
+# Seeds whose results are told, and those that rankings are checked against: tuning and trial have others.
 TOLD, AGAIN = 1, 2
-# What holds less than this share of what is held without any element hides every wall.
+# An element that holds less than this share of what is held without one hides every wall.
 _SHOWS = 0.1
 _LATER_S, _FINER, _DRIVE_HZ = 1e-3, 0.25, 100.0
 
@@ -34,10 +34,10 @@ class OfLoop:
     """All stabilizers on one loop.
 
     Attributes:
-        delay_s: the round trip.
-        alone_N_m: about the stiffest wall without any, from which the searches begin.
-        rows: under the seeds told.
-        again: under the others.
+        delay_s: the round-trip delay.
+        alone_N_m: roughly the stiffest wall without any, from which the searches begin.
+        rows: the results under the seeds that are told.
+        again: the results under the others.
     """
 
     name: str
@@ -52,8 +52,8 @@ class Comparison:
     """What ``haploop compare`` found.
 
     Attributes:
-        effort: on the loop as described, the first of the loops.
-        beside: on each other.
+        effort: the effort on the loop as described, the first of the loops.
+        beside: the effort on each of the other loops.
         task: what every wall has to bear, in words.
     """
 
@@ -80,7 +80,7 @@ def variants(loop: Scene) -> dict[str, Scene]:
 
 
 class Kept:
-    """Rows found earlier, by a key that has everything in it that decides; a line each in a file."""
+    """Rows found earlier, by a key made of everything that decides them; one line each in a file."""
 
     def __init__(self, file: Path) -> None:
         self._file, self._known = file, dict[str, Any]()
@@ -108,11 +108,11 @@ def key_of(*told: object) -> str:
 def compare(
     loops: dict[str, Scene], effort: Effort, beside: Effort, kept: Kept, executor: Executor, stage: Stage
 ) -> tuple[OfLoop, ...]:
-    """Tunes and tries every stabilizer on every loop but what is kept, each by two sets of seeds.
+    """Tunes and tries every stabilizer on every loop, except what is kept already, each under two sets of seeds.
 
     Args:
-        effort: on the first loop, in the whole box of parameters.
-        beside: on each other, about what is best on the first.
+        effort: the effort on the first loop, in the whole box of parameters.
+        beside: the effort on each of the others, around what is best on the first.
     """
     found: dict[tuple[str, str], tuple[Row, ...]] = {}
     alone_N_m = _each(alone, loops, kept, executor, stage, "walls without any element", float)
@@ -142,7 +142,7 @@ def compare(
 
 
 def plays(family: Family, loop: Scene, alone_N_m: float) -> bool:
-    """Tells whether a family can hold what compares with a wall without any element: force bounding may not."""
+    """Tells whether a family can hold as much as compares with a wall without an element: force bounding may not."""
     return family is not FORCE_BOUNDING or bounded_N_m(loop) > _SHOWS * alone_N_m
 
 
@@ -160,7 +160,7 @@ def _each(
     call: Callable[[Any], Any], items: Mapping[Any, Any], kept: Kept, executor: Executor, stage: Stage, words: str,
     read: Callable[[Any], Any],
 ) -> dict[Any, Any]:  # fmt: skip
-    """Calls on each item that nothing is kept of, and returns the answers by name; they are kept as they come."""
+    """Calls a function on each item without a kept answer, and returns all answers by name; keeps them as they come."""
     keys = {name: key_of(call.__name__, item) for name, item in items.items()}
     new = {keys[name]: item for name, item in items.items() if kept.get(keys[name]) is None}
     advance = stage(words, len(items))
@@ -183,7 +183,7 @@ def _as_rows(data: Sequence[dict[str, Any]]) -> tuple[Row, ...]:
 
 
 def _as_row(data: dict[str, Any]) -> Row:
-    """Returns the row that ``asdict`` and JSON made lists of."""
+    """Returns a row from its form in JSON, by way of ``asdict``."""
     read: dict[str, Any] = {name: tuple(data[name]) for name in ("values", "at_edge", "parameter", "device")}
     read["seeds"] = tuple(map(_as_trying, data["seeds"]))
     return Row(**data | read)

@@ -9,22 +9,22 @@ from haploop.tools.advise.walls.cases import HOLDS, SWAY, Case, hold_N, slowness
 from haploop.tools.advise.walls.corners import DELAY, Ranges
 from haploop.tools.render.units import amount
 
-# The hand presses with 1 N, or with this share of what the actuator gives where that is less: more than in an advice,
+# The hand presses with 1 N, or with this share of the actuator's largest force if that is less: more than in an advice,
 # since no actuator is weaker here than described.
 COMPARED_WITH = 0.3
-# How often the hand sways, Hz, and how fast it comes, m/s, at least and at most.
+# Frequency of the hand's sway, Hz, and speed of its tap, m/s, at least and at most.
 _SWAY_HZ, _TAP_M_S = (0.3, 0.8), (0.02, 0.24)
 # What is not quite as described; friction, damping and actuator are the same for every element.
 _OFF = (DELAY, "device mass", "hand mass", "hand damping", "hand stiffness", "cable stiffness")
 
 
 def draw(of: Ranges, block: int, seed: int, count: int) -> tuple[Case, ...]:
-    """Returns so many cases: one hold in each part of the range of holds, all else anywhere between its ends.
+    """Returns ``count`` cases: one hold in each part of the range of holds, all else anywhere between its ends.
 
-    A delay is at either end, since loops of one delay run side by side.
+    A delay is at either end, since only loops with the same delay run side by side.
 
     Args:
-        block: seeds of one block and another share no case.
+        block: a block of seeds; two blocks share no case.
     """
     random = np.random.default_rng([block, seed])
     low, high = HOLDS[0], HOLDS[-1]

@@ -35,8 +35,8 @@ def draw(told: Comparison, target: Path) -> Path:
 
 
 def figure_of(comparisons: Sequence[Comparison]) -> Figure:
-    """Makes a row of panels a device: how much more is held than without any element, as described under both sets of
-    seeds, and on the other loops where there are any; ripple and force of the element.
+    """Makes a row of panels per device: how much more is held than without any element, as described under both sets of
+    seeds, and on the other loops if there are any; ripple and force of the element.
 
     Raises FigureError where matplotlib is missing.
     """

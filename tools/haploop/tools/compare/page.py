@@ -76,7 +76,7 @@ Loops = dict[Place, OfLoop]
 
 
 def sentences(comparisons: Sequence[Comparison]) -> list[str]:
-    """Returns five sentences, parts divided by semicolons; a loop is named where its rankings put it there."""
+    """Returns five sentences, their parts divided by semicolons; each names the loops to which it applies."""
     loops = {(told.name, of.name): of for told in comparisons for of in told.loops}
     taken: dict[str, list[Place]] = {}
     for place, of in loops.items():
@@ -95,7 +95,7 @@ def sentences(comparisons: Sequence[Comparison]) -> list[str]:
 
 
 def versus(some: Family, other: Family, loops: Loops) -> str:
-    """Says on how many loops of which device some family holds more than another, and on how many less."""
+    """Says on how many loops of each device some family holds more than another, and on how many less."""
     where, than = _compared(some, other, loops), "no element" if other is NOTHING else other.name
     told = [f"{word} {_counted(where[word], loops)}" for word in ("more", "less") if where[word]]
     if not told:
@@ -120,7 +120,7 @@ def _counted(of: Sequence[Place], loops: Loops) -> str:
 
 
 def _by_device(of: Sequence[Place], loops: Loops) -> dict[str, tuple[list[str], list[str]]]:
-    """Returns the names of these loops, and of all, of every device that has any of these."""
+    """Returns, for every device that has any of these loops, the names of these and of all its loops."""
     return {
         device: ([name for on, name in of if on == device], [name for on, name in loops if on == device])
         for device in dict.fromkeys(device for device, _ in of)
@@ -135,7 +135,7 @@ def _compared(some: Family, other: Family, loops: Loops) -> dict[str, list[Place
 
 
 def _verdict(loops: Loops) -> str:
-    """Says whether inertia of an adaptive element helps on any loop, harms on any, and is what to take on any."""
+    """Says whether inertia of an adaptive element helps on any loop, harms on any, and is the element to use on any."""
     helps = [_compared(*pair, loops) for pair in _ADAPTIVE]
     more, less = (any(each[word] for each in helps) for word in ("more", "less"))
     if not more or less:
@@ -192,7 +192,7 @@ def _table(of: OfLoop) -> str:
 
 
 def write(rows: Path, docs: Path) -> Path:
-    """Compares on every device but what is kept in ``rows``, and writes page and figure; returns the page's file.
+    """Compares on every device, except what is kept in ``rows``, and writes page and figure; returns the page's file.
 
     Raises FigureError without matplotlib.
     """

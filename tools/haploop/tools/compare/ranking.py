@@ -1,4 +1,4 @@
-"""Rankings of stabilizers: two are apart whose difference, seed by seed, is far from 0 under either set of seeds."""
+"""Rankings of stabilizers: two are apart if their difference, seed by seed, is far from 0 under both sets of seeds."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from haploop.tools.compare.bench import Row
 from haploop.tools.compare.comparison import OfLoop
 from haploop.tools.search.intervals import Interval, mean_interval
 
-# Of some thousand pairs on a page a twentieth is beyond its 95 % interval by chance; so pairs are told by this many
-# standard errors.
+# Of some thousand pairs on a page a twentieth is beyond its 95 % interval by chance; so pairs are told apart by this
+# many standard errors.
 _ERRORS = 3.0
 
 
@@ -40,12 +40,12 @@ def without(rows: Sequence[Row]) -> Row:
 
 
 class Ranking(NamedTuple):
-    """Pairs of stabilizers that are apart under the seeds told, the one that renders more first.
+    """Pairs of stabilizers that are apart under the seeds that are told, the one that renders more first.
 
     Attributes:
         told: all of them.
-        reproduced: those that are apart the same way under the other seeds, too.
-        contradicted: those that are apart the other way there.
+        reproduced: those that are apart in the same direction under the other seeds, too.
+        contradicted: those that are apart in the opposite direction there.
     """
 
     told: frozenset[tuple[str, str]]
@@ -84,8 +84,8 @@ def best(of: OfLoop) -> tuple[Row, list[Row]]:
 
 
 def choice(of: OfLoop) -> Row:
-    """Returns what to take: the first in the list that is told to hold more than no element, and less than no other; no
-    element where none is."""
+    """Returns the stabilizer to use: the first in the list that can be told to hold more than no element, and not less
+    than any other; no element if there is none."""
     order = ranking(of)
     gains = [row for row in of.rows if order.versus(row.family, NOTHING.name) == "more"]
     unbeaten = [row for row in gains if all(order.versus(row.family, other.family) != "less" for other in gains)]

@@ -66,7 +66,7 @@ def task_sentence(told: Comparison) -> str:
 
 
 def most_sentence(of: OfLoop) -> str:
-    """Says what renders most, and what cannot be told from it under both sets of seeds."""
+    """Says which stabilizer renders most, and which cannot be told from it under both sets of seeds."""
     found, tied = best(of)
     if choice(of).family == NOTHING.name:
         return _NO_GAIN.format(format_stiffness(held(without(of.rows)).value))
@@ -90,7 +90,7 @@ def join(names: Sequence[str]) -> str:
 
 
 def cells(row: Row, of: OfLoop) -> dict[str, str]:
-    """Formats all that is told of a row on its loop."""
+    """Formats all numbers of a row on its loop, by column."""
     shown = [each.rendered for each in row.seeds]
     wall = float(np.mean([each.wall_N_m for each in row.seeds]))
     marks = ("†" if "wall" in row.at_edge else "") + ("*" if set(row.at_edge) - {"wall"} else "")
@@ -115,7 +115,7 @@ def cells(row: Row, of: OfLoop) -> dict[str, str]:
 
 
 def gain(row: Row, of: OfLoop) -> str:
-    """Formats how much more is held than with no element, N/mm, and whether that is told: ``+0.3 (+0.1 to +0.5) ▲``."""
+    """Formats how much more is held than with no element, N/mm, marked if told apart: ``+0.3 (+0.1 to +0.5) ▲``."""
     if row.family == NOTHING.name:
         return "–"
     inside = more(row, without(of.rows))
@@ -149,7 +149,7 @@ def _costs(of: OfLoop) -> Table:
 
 
 def _breaks(row: Row) -> str:
-    """Says where a wall breaks first, in short: how stiff, how often it swings, and at which hold."""
+    """Says where a wall breaks first, in short: how stiff, at which frequency, and at which hold."""
     worst = min((each for each in row.seeds if each.failure), key=lambda each: each.fails_N_m, default=None)
     if not worst or not worst.failure:
         return "–"

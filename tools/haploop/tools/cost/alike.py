@@ -1,8 +1,8 @@
 """Plant steps of all methods written alike: their operations counted, and timed step by step and in arrays.
 
-In a run, the exact flow of one mass has code of its own, every other method that of any chain of bodies, step by step
-in Python: what that costs is no property of a method. Here each makes its step by the same kind of formula on rows of
-numbers, or of arrays of motions, and no friction acts.
+In a run, the exact flow of one mass has code of its own, and every other method uses that for any chain of bodies, step
+by step in Python: what that costs is not a property of the method. Here each makes its step by the same kind of formula
+on rows of numbers, or of arrays of motions, and no friction acts.
 """
 
 from __future__ import annotations

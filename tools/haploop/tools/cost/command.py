@@ -1,4 +1,4 @@
-"""``haploop cost``: errors and times of every method at every plant rate; a stopped command goes on where it was."""
+"""``haploop cost``: errors and times of every method at every plant rate; a stopped command continues where it was."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def cost(
 ) -> None:
     """Measure what accuracy costs in time. Error and time of every method at every plant rate, and advice.
 
-    Can be stopped; the same command goes on.
+    It can be stopped; the same command continues it.
     """
     from haploop.tools.cost import figure, prices_figure
     from haploop.tools.cost.data import COST_FILE, save

@@ -21,10 +21,10 @@ class CostFileError(ValueError):
 
 @dataclass(frozen=True)
 class Spread:
-    """Repeated measurements of one quantity: their median, and an interval for the median of endlessly many.
+    """Repeated measurements of one quantity: their median, and an interval for the median of infinitely many.
 
-    The interval lies between two order statistics, chosen so that it misses with 5 % at most whatever the distribution;
-    with fewer than six values it is all of them, and misses more often.
+    The interval lies between two order statistics, chosen so that it misses with a probability of at most 5 % whatever
+    the distribution; with fewer than six values it spans all of them, and misses more often.
     """
 
     median: float
@@ -74,7 +74,7 @@ class Errors:
 
     @property
     def at_most_m(self) -> float:
-        """What is held against a tolerance: the upper end of the interval."""
+        """The number that is compared with a tolerance: the upper end of the interval."""
         return self.size_m + self.doubt_m
 
 
@@ -84,8 +84,8 @@ class Point:
 
     Attributes:
         error, failure: one of them is None; a failure is a sentence.
-        time: of a simulated tick in one process, books on, no log, over that of the yardstick; of a run that diverged,
-            of the ticks it has until its numbers are too large. None for a scene refused by the check.
+        time: of a simulated tick in one process, books on, no log, over that of the yardstick; for a run that diverged,
+            of the ticks before its numbers became too large. None for a scene refused by the check.
     """
 
     method: str
@@ -116,8 +116,8 @@ class ReferenceNote:
 class SceneCost:
     """Every point of one scene, its own method and rates in Hz, the ticks of a run, and the advice.
 
-    ``compiled`` are points of methods by loops of machine code, which give the same bits: a long run in one process
-    uses them, where they can be had; ``points`` are without.
+    ``compiled`` are points of methods with loops of machine code, which give the same bits: a long run in one process
+    uses them if they are available; ``points`` are without.
     """
 
     name: str
@@ -159,15 +159,15 @@ class Load:
 
 @dataclass(frozen=True)
 class Price:
-    """The price of one thing that can be had or left.
+    """The price of one thing that can be used or left out.
 
     Attributes:
         time: measured, in the unit of its group.
-        adds: the time less the baseline's, from repeat to repeat; None for the baseline.
+        adds: the time less the baseline's, repeat by repeat; None for the baseline.
         moves_m: how far the motion is from the baseline's, at most; None where that was not asked for.
         buys: the gain, in words.
         instructions_per_tick: bytecode instructions of plant and controller; None where they were not counted.
-        stiffness: up to where a wall stays steady; None where that was not asked for.
+        stiffness: up to which a wall stays steady; None where that was not asked for.
     """
 
     what: str
@@ -222,7 +222,7 @@ class AlikeScene:
 class Cost:
     """All of cost.json; ``load`` is None where no time was measured.
 
-    Times are over that of ``yardstick``, a sentence, taken before and after each of them.
+    Times are divided by that of ``yardstick``, a sentence, taken before and after each of them.
     """
 
     machine: str

@@ -24,7 +24,7 @@ _PANEL_IN = 5.0, 4.4
 _MARKED_HZ = 10_000
 UNCERTAIN = "#E4E4E4"
 _TITLE_LETTERS, _LETTERS_PER_IN = 58, 10.5
-# Colours that the colour-blind tell apart, and a marker each, for those who see none; others begin anew.
+# Colours that the colour-blind can tell apart, each with a marker, for those who see none; other methods share one.
 LOOKS: dict[str, tuple[str, str]] = {
     "exact": (style.WALL, "o"),
     "semi-implicit-euler": (style.ELEMENTS[0], "s"),
@@ -35,7 +35,7 @@ LOOKS: dict[str, tuple[str, str]] = {
     COMPILED: (style.OF_THE_PLANT["friction"], "*"),
 }
 _OTHER = style.GREY, "X"
-# Below a reference's uncertainty there is nothing to see: what is smaller than this share of it is drawn there.
+# Errors below a reference's uncertainty cannot be seen: those below this share of it are drawn at this share.
 _WITHIN = 0.3
 # The share of a panel's height that failures take at its top edge.
 _TOP = 0.08
@@ -125,7 +125,7 @@ def _limits(scene: SceneCost, tolerance_m: float) -> tuple[float, float, float]:
 
 
 def drawn_m(point: Point, scene: SceneCost) -> float:
-    """Returns the error of a point as drawn: no less than a share of the reference's uncertainty, or what is sure."""
+    """Returns the error of a point as drawn: at least a share of the reference's uncertainty; its upper end if in doubt."""
     size_m = math.inf if point.error is None else point.at_most_m if _in_doubt(point.error) else point.error.size_m
     return max(size_m, _WITHIN * scene.reference.error_m, 1e-18)
 
@@ -170,7 +170,7 @@ def _curve(ax: Axes, points: list[Point], scene: SceneCost) -> None:
 
 
 def label_points(ax: Axes, scene: SceneCost) -> None:
-    """Writes the plant rate in kHz beside the points: of the scene's own method first, then where there is room."""
+    """Writes the plant rate in kHz beside the points: for the scene's own method first, then where there is room."""
     timed = [point for point in drawn(scene) if point.time]
     labels = []
     for point in sorted(timed, key=lambda point: (point.method != scene.own_method, not point.error)):

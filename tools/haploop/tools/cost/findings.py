@@ -15,7 +15,7 @@ AGAIN = "no effect again"
 _NONE, EXACT, _RIVAL = "–", "exact", "euler"
 # The exact flow by loops of machine code.
 COMPILED = "exact, machine code"
-# An error that nobody asks after, of which the last digits may differ from machine to machine.
+# An error too small to be of interest, whose last digits may differ from machine to machine.
 _NOTHING_M = 1e-9
 # Errors that are asked for, m.
 DIGITS_M = (30e-6, 10e-6, 3e-6, 1e-6, 1e-7)
@@ -45,7 +45,7 @@ def cheapest(scene: SceneCost, tolerance_m: float, method: str | None = None) ->
 
 
 def as_cheap(scene: SceneCost, tolerance_m: float) -> list[Point]:
-    """Returns of every method as cheap as the cheapest the point of the lowest plant rate: intervals overlap."""
+    """Returns, for every method as cheap as the cheapest (intervals overlap), its point of the lowest plant rate."""
     best, found = cheapest(scene, tolerance_m), {}
     for point in sorted(scene.points, key=lambda point: point.plant_rate):
         if best and point.time and meets(point, tolerance_m) and point.time.overlaps(_time(best)):
@@ -54,7 +54,7 @@ def as_cheap(scene: SceneCost, tolerance_m: float) -> list[Point]:
 
 
 def meets(point: Point, tolerance_m: float) -> bool:
-    """Tells whether a run went to its end within the tolerance, interval and all."""
+    """Tells whether a run reached its end within the tolerance, including its interval."""
     return point.error is not None and point.at_most_m <= tolerance_m
 
 
@@ -104,9 +104,9 @@ def findings(cost: Cost) -> list[FindingTable]:
 
 
 def _digit_table(cost: Cost) -> FindingTable:
-    """Makes a row a scene: the cheapest setting at every error asked for, and where the exact flow takes over.
+    """Makes a row per scene: the cheapest setting at every error asked for, and where the exact flow takes over.
 
-    Another row of a scene that has times of the exact flow as machine code, with these in place of its others.
+    A scene that has times of the exact flow as machine code gets another row, with these in place of its others.
     """
     rows = []
     for scene in cost.scenes:
@@ -138,7 +138,7 @@ def _cell(scene: SceneCost, digit_m: float) -> str:
 
 
 def _alike_table(cost: Cost) -> FindingTable:
-    """Makes a row a method: operations of its step, its time over that of the exact flow, and operations a tick."""
+    """Makes a row per method: operations of its step, its time over that of the exact flow, and operations a tick."""
     by_states = _by_states(cost)
     sizes = sorted(by_states)
     pairs = _alike_pairs(cost)
@@ -160,7 +160,7 @@ def _alike_table(cost: Cost) -> FindingTable:
 
 
 def _by_states(cost: Cost) -> dict[int, AlikeScene]:
-    """Returns the first of the scenes of each number of states: the one whose steps are told."""
+    """Returns the first of the scenes of each number of states: the one whose steps are shown."""
     return {of.states: of for of in reversed(cost.alike)}
 
 
@@ -173,7 +173,7 @@ def _step(of: AlikeScene, method: str) -> Step:
 
 
 def alike_sentence(cost: Cost) -> str | None:
-    """Makes a sentence of how much of a method's time in a run comes of how it is written; None without such times."""
+    """Makes a sentence on how much of a method's time in a run is due to how it is written; None without such times."""
     for scene, of in sorted(_alike_pairs(cost), key=lambda pair: pair[1].states):
         exact, rival = (scene.point(method, min(p.plant_rate for p in scene.points)) for method in (EXACT, _RIVAL))
         if exact and rival and exact.time and rival.time and any(step.method == _RIVAL for step in of.steps):
@@ -194,7 +194,7 @@ def operations_a_tick(scene: SceneCost, of: AlikeScene, method: str, tolerance_m
 
 
 def _swing_table(scene: SceneCost) -> FindingTable:
-    """Makes a row a method of a chaotic scene: how far the mean swing is off, with its interval, at every rate."""
+    """Makes a row per method of a chaotic scene: how far the mean swing is off, with its interval, at every rate."""
     rates = sorted({point.plant_rate for point in scene.points})
     methods = dict.fromkeys(point.method for point in scene.points)
     rows = [[method, *(_swing(scene.point(method, hertz)) for hertz in rates)] for method in methods]
@@ -218,9 +218,9 @@ def is_told_apart(error: Errors) -> bool:
 
 
 def takes_away(cost: Cost) -> str:
-    """Makes the one sentence of the figure of methods: down to which error another method than the exact flow pays.
+    """Makes the sentence of the figure of methods: down to which error a method other than the exact flow pays.
 
-    With another, where it has times as machine code, of how many scenes that leaves.
+    If there are times of machine code, a second sentence says in how many scenes that is still so.
     """
     without = _takes_away(cost.scenes)
     if not any(point.time for scene in cost.scenes for point in scene.compiled):
@@ -255,7 +255,7 @@ def effects_sentence(group: PriceGroup) -> str:
 
 
 def sum_sentence(group: PriceGroup) -> str:
-    """Makes a sentence that holds what effects add alone, added up, against what they add together."""
+    """Makes a sentence that compares the sum of what effects add alone with what they add together."""
     together = next(price.adds for price in group.prices if price.adds and price.what == WHOLE)
     added = fixed(sum(adds.median for adds in _alone(group).values()), 2)
     return f"Added up they come to {added}, all at once to {interval(together)}."

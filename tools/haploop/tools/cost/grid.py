@@ -27,7 +27,7 @@ from haploop.tools.trajectory import Trajectory, trajectory
 METHODS = tuple(INTEGRATORS)
 # Starts of a chaotic scene, their distance, and the 97.5 % quantile of Student's t with one degree of freedom less.
 STARTS, _APART_M, _T = 30, 1e-6, 2.045
-# Errors depend on these packages whole, and of this one on these files; times on more of them.
+# Errors depend on all of these packages, and in this package on these files; times depend on more of them.
 _PACKAGES = ("haploop.protocol", "haploop.plant", "haploop.controller", "haploop.logger", "haploop.launch")
 _OF_ERRORS = ("cost/grid.py", "trajectory.py", "cost/reference.py")
 _OF_TIMES = (
@@ -78,7 +78,7 @@ class Grid:
 def grid(path: Path, methods: Sequence[str], rates: Sequence[int]) -> Grid:
     """Makes every candidate of a scene file; SceneError where the scene cannot be run as it is.
 
-    A method that chooses its own steps has nothing from another plant rate: it is one candidate, at the lowest.
+    A method that chooses its own steps gains nothing from another plant rate: it is one candidate, at the lowest.
     """
     made = Grid(path, load(path), [])
     order = [*methods, made.own[0]]
@@ -119,7 +119,7 @@ def accuracy_scenes() -> list[Path]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The outcome of one candidate in runs that are not timed: an error or a failure, and the ticks that it had."""
+    """The outcome of one candidate in runs that are not timed: an error or a failure, and the ticks that it ran."""
 
     error: Errors | None
     failure: str | None
@@ -154,7 +154,7 @@ def outcome(candidate: Candidate, reference: Reference, swings: Sequence[Swings]
     if candidate.scene is None:
         return Outcome(None, candidate.refusal, 0)
     try:
-        # A method that blows up overflows on the way; that is said once, as the reason of the failure.
+        # A method that blows up overflows on the way; that is reported once, as the reason for the failure.
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore", RuntimeWarning)
             ran = trajectory(candidate.scene)
@@ -180,8 +180,8 @@ def _failure(ran: Trajectory, reference: Reference) -> str | None:
 def _errors(runs: list[Trajectory], scene: Scene, reference: Reference, swings: Sequence[Swings]) -> Errors:
     """Compares positions at the ticks after the start: sqrt(mean((x - x_ref)^2)) and the like.
 
-    Where a chaotic reference forbids that, the swings at the end are: of the differences to those of the
-    exact flow from the same start the mean, and half of its 95 % interval, by Student's t.
+    Where a chaotic reference forbids that, the swings at the end are compared: the mean of their differences from those
+    of the exact flow from the same start, and half of its 95 % interval, by Student's t.
     """
     ran = runs[0]
     energy = ran.summary["energy"]

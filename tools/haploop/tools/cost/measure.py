@@ -1,4 +1,4 @@
-"""The measurements of ``haploop cost``: out of the store where known, else made; put together for cost.json."""
+"""The measurements of ``haploop cost``: taken from the store if known, else made; put together for cost.json."""
 
 from __future__ import annotations
 
@@ -33,10 +33,11 @@ _OUTCOME, _REFERENCE, _ALIKE = "outcome", "reference", "steps alike"
 
 
 class Measurement:
-    """The measurements of some grids, kept in a directory that is there.
+    """The measurements of some grids, kept in an existing directory.
 
-    Repeats are of each time in one process, and of the other prices as processes, 0 for not at all. ``find_reference``
-    makes or finds what the runs of a scene, given by its file and resolved, are compared with.
+    ``repeats`` is how often each time in one process is measured, ``processes_repeats`` each other price as processes,
+    0 for not at all. ``find_reference`` makes or finds what the runs of a scene, given by its file and resolved, are
+    compared with.
     """
 
     def __init__(
@@ -58,7 +59,7 @@ class Measurement:
         return of.key(*self._times_made_with)
 
     def errors(self, stage: Stage) -> None:
-        """Runs and compares every candidate of which nothing is known, in random order, to tell the time left well."""
+        """Runs and compares every candidate not known yet, in random order, so that the time left is estimated well."""
         for grid in self._grids:
             left = [c for c in grid.candidates if not self._store.has(_OUTCOME, self._error_key(c))]
             if not left and self._store.has(_REFERENCE, self._error_key(grid)):
@@ -94,15 +95,15 @@ class Measurement:
 
     @staticmethod
     def _ways(candidate: Candidate) -> tuple[bool, ...]:
-        """Returns whether a candidate is timed as machine code: not, and where there is some for its motion, too."""
+        """Returns whether a candidate is timed as machine code: without it, and also with it if its motion has some."""
         has_loops = candidate.method == EXACT and candidate.scene and candidate.scene.friction and find_spec("numba")
         return (False, True) if has_loops else (False,)
 
     def _job(self, candidate: Candidate, is_compiled: bool) -> Job | None:
-        """Makes a job of a candidate whose run had a tick.
+        """Makes a job from a candidate whose run had a tick.
 
-        A run that diverges has but a few ticks: it is let go on far beyond where it is stopped otherwise, in blocks so
-        short that there is more than the first one where it can be.
+        A run that diverges has only a few ticks: it may go on far beyond where it is otherwise stopped, in blocks so
+        short that there is more than one if possible.
         """
         came, scene = self._outcome(candidate), candidate.scene
         key = _compiled(self._time_key(candidate), is_compiled)
@@ -140,7 +141,7 @@ class Measurement:
         return found and AlikeScene(grid.path.stem, states, TypeAdapter(list[Step]).validate_python(found))
 
     def _scene_cost(self, grid: Grid, tolerance_m: float) -> SceneCost | None:
-        """Returns what is known of a scene, with advice once that is all; None before its reference is there."""
+        """Returns what is known of a scene, with advice once that is complete; None before its reference exists."""
         if (note := self._store.get(_REFERENCE, self._error_key(grid))) is None:
             return None
         points = [point for candidate in grid.candidates if (point := self._point(candidate, False))]

@@ -1,4 +1,4 @@
-"""A cost.json told on the terminal, and as docs/accuracy.md with its figures: ``make accuracy``."""
+"""A cost.json shown on the terminal, and as docs/accuracy.md with its figures: ``make accuracy``."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _READING = (
     "the yardstick; interval: 95 %, of the median. Starting up is left out; in brackets: of the few ticks before a "
     "failure. Bold: the scene's own setting."
 )
-# Groups that are told in a table; the others are curves of the figure.
+# Groups that are shown in a table; the others are curves of the figure.
 _TABLED = ("books", "log", "processes")
 PAGE, FIGURE, PRICES_FIGURE = "accuracy.md", "accuracy.png", "accuracy_prices.png"
 _INTRO = """\
@@ -73,7 +73,7 @@ alone, and shares them with others."""
 
 
 def report(cost: Cost) -> RenderableType:
-    """Makes the terminal's report: a table a scene and a group of prices, how to read them, and the advice."""
+    """Makes the terminal's report: a table per scene and per group of prices, how to read them, and the advice."""
     lines = [Text.assemble((f"{scene.name}: ", "bold"), scene.advice) for scene in cost.scenes]
     small = [Text(words, style="dim") for words in (_READING, yardstick(cost), made_with(cost))]
     return Group(*map(_scene_table, cost.scenes), *map(_price_table, cost.prices), *small, *lines)
@@ -109,7 +109,7 @@ def _time_cells(point: Point) -> tuple[str, str]:
 
 
 def _price_table(group: PriceGroup) -> RenderableType:
-    """Makes the table of a group of prices; what each adds is against its first row."""
+    """Makes the table of a group of prices; what each adds is relative to its first row."""
     heads, *rows = price_rows(group)
     table = make_table(*heads, numbers=heads[1:-1], unbroken=("",), padding=(0, 1, 0, 0))
     for row in rows:
@@ -136,7 +136,7 @@ def price_rows(group: PriceGroup) -> list[list[str]]:
 
 
 def yardstick(cost: Cost) -> str:
-    """Returns what a time is over, and how steady it was, as sentences."""
+    """Returns the yardstick that times are divided by, and how steady it was, as sentences."""
     words = f"The yardstick is {cost.yardstick}"
     if not (load := cost.load):
         return f"{words}."

@@ -34,7 +34,7 @@ from haploop.tools.trajectory import trajectory
 _DELAYS_S = (0.0, 0.001, 0.002, 0.005, 0.010)
 _CONTROL_RATES_HZ = (1_000, 500, 2_000, 5_000, 10_000)
 _LOGS = ("none", "ticks", "steps")
-# Held long enough that a time is no accident; a scene that swings apart runs to its end all the same.
+# Run long enough that a time is no accident; a scene that diverges nevertheless runs to its end.
 _IN_PROCESS_S, _EFFECTS_S, _PROCESSES_S = 1.0, 0.5, 2.0
 _FREE, _PROMPT = "diverged_beyond=1e9", "clock.round_trip_delay=0.0"
 # A hand of 10 kg that swings by 30 mm through a soft wall, whatever else is in the loop: so an effect that is added
@@ -69,7 +69,7 @@ _BUYS = {
 }
 
 
-# What a run costs is asked for, not what its verdict does.
+# The cost of a run is asked for, not that of its verdict.
 _BY_WINDOW = ("run.verdict=window",)
 # Group -> what -> job; jobs of the same key are the same and timed once.
 Jobs = dict[str, dict[str, Job]]
@@ -98,7 +98,7 @@ def price_jobs(depends_on: Sequence[Any]) -> Jobs:
     # Plant and controller alone: their telemetry is made and thrown away.
     bare = Job(IN_PROCESS, "bare", "bare", with_books.scene, lambda: bare_us(with_books.scene))
     whole = load(scenes / "all_effects.toml", [f"duration={_EFFECTS_S}", _FREE, "run.log=none", *_BY_WINDOW, *_LED])
-    # That which others are read through comes first.
+    # The effect that others are read through comes first.
     names = sorted((effect.name for effect in effects_of(whole)), key=lambda name: name != _READ)
     effects = {NONE: alone(whole), AGAIN: alone(whole), **{name: alone(whole, name) for name in names}}
     jobs = {
@@ -156,7 +156,7 @@ def bare_us(scene: Scene) -> float | None:
 class Prices:
     """Measures what is missing in an open store, and puts together what is there.
 
-    Repeats are of each time, by way; prices of a way with 0 repeats are left out.
+    ``repeats`` is how often each time is measured, by way; prices of a way with 0 repeats are left out.
     """
 
     def __init__(self, store: Store, repeats: Mapping[str, int]) -> None:
@@ -167,7 +167,7 @@ class Prices:
         }
 
     def measure(self, stage: Stage) -> None:
-        """Makes every measurement that is missing: limits and counts first, since they do not depend on the hour."""
+        """Makes every missing measurement: limits and counts first, since they do not depend on when they are made."""
         kinds, groups = registry(), self._jobs.items()
         makers = {
             (_LIMIT, _WITH_LIMIT): lambda scene: dataclasses.asdict(stiffness_limit(scene, kinds)),

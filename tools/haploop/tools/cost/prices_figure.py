@@ -26,7 +26,7 @@ _PLACES |= {"delay": (0, 3, 2), "control rate": (3, 3, 2)}
 
 
 def figure_of(groups: list[PriceGroup]) -> Figure:
-    """Makes a panel a group; raises FigureError where matplotlib is missing, or there is no group."""
+    """Makes a panel per group; raises FigureError if matplotlib is missing or there is no group."""
     if not groups:
         raise FigureError("No price was measured, so there is nothing to draw.")
     figure = style.empty_figure(*_SIZE_IN)

@@ -19,11 +19,12 @@ from haploop.tools.trajectory import trajectory
 REFERENCES = Path(__file__).parent / "references"
 # A reference made on the spot has at least this plant rate, and is checked against half of it.
 _LEAST_RATE = 100_000
-# Starts moved by so much tell whether positions at a time can be compared at all: the errors of the methods compared.
+# Moves of the start that show whether positions at a time can be compared at all: as large as the errors of the methods
+# compared.
 MOVES_M = (1e-12, -1e-12, 1e-9, -1e-9, 1e-7, -1e-7)
 # Beyond this growth of such a move, they cannot.
 MOST_GROWTH = 1000.0
-# What is of no consequence to the continuous problem that a scene poses.
+# What makes no difference to the continuous problem that a scene poses.
 _OF_THE_METHOD = ("plant_rate", "integrator")
 _OF_THE_RUN = ("title", "run")
 
@@ -107,7 +108,7 @@ def difference_m(x: Sequence[float] | np.ndarray, other: Sequence[float] | np.nd
 
 
 def growths(scene: Scene, plant_rate: int) -> dict[str, float]:
-    """Returns by each move of the start (m, as text) how many times as far apart the runs get at most."""
+    """Returns, for each move of the start (m, as text), how many times as far apart the runs get at most."""
     exact = exactly(scene, plant_rate)
     start = trajectory(exact)
     found = {}

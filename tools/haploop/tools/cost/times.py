@@ -1,8 +1,8 @@
 """Times of a simulated tick over that of a yardstick: warm, in random order, repeated, without garbage collection.
 
-A round times every candidate once, in an order drawn anew for each round from a fixed seed, and the yardstick before
-and after it: what drifts or disturbs meets all of them alike. In one process the time is that of the processor, which
-stands still while another program has it. Each ratio is stored at once, so that a command that was stopped goes on.
+A round times every candidate once, in an order drawn for each round from a fixed seed, and the yardstick before and
+after it: drift and disturbances affect all of them alike. In one process, processor time is measured, which stands
+still while another program has the processor. Each ratio is stored at once, so that a stopped command can continue.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _YARDSTICK_S = 1.5
 class Store:
     """DIR/points.jsonl: records by (what, key, repeat), a line each, only appended.
 
-    A line that was cut off when the program was killed is passed over: its record is measured again.
+    A line that was cut off when the program was killed is skipped: its record is measured again.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -91,9 +91,9 @@ class Store:
 class Job:
     """A resolved scene and a way to time its run, ``IN_PROCESS`` or ``PROCESSES``.
 
-    Of the jobs of one ``family`` one, run untimed beforehand, warms up all. ``key`` is its name in the store. ``clock``
-    runs it once and returns the time of a tick, µs; None where the run failed. ``is_compiled``: by loops of machine
-    code, as they serve a long run in one process; a short one, and a node, go without.
+    One job of a ``family``, run untimed beforehand, warms up all of it. ``key`` is its name in the store. ``clock``
+    runs it once and returns the time of a tick, µs; None where the run failed. ``is_compiled``: with loops of machine
+    code, as in a long run in one process; a short one, and a node, do without.
     """
 
     way: str
@@ -113,7 +113,7 @@ class Job:
 
 
 def _have_machine_code(is_compiled: bool) -> None:
-    """Has the next run in this process use loops of machine code from its start, or none of them."""
+    """Makes the next run in this process use loops of machine code from its start, or none of them."""
     for loops in (chain_motion.LOOPS, motion.LOOPS, projected.LOOPS, segments.LOOPS):
         loops.asked = int(loops.pays) if is_compiled else 0
 
@@ -121,7 +121,7 @@ def _have_machine_code(is_compiled: bool) -> None:
 def loop_us(scene: Scene) -> float | None:
     """Returns the time of a tick in this process, with books, without log, µs; None where the run could not go on.
 
-    Building plant and controller is not counted. A method that blows up overflows: the caller keeps its warnings back.
+    Building plant and controller is not counted. A method that blows up overflows: the caller silences its warnings.
     """
     base = Timebase.from_scene(scene)
     session = open_session(scene, base, None, {})
@@ -136,7 +136,7 @@ def loop_us(scene: Scene) -> float | None:
 def tick_us(block: Callable[[], bool], tick: Callable[[], int]) -> float | None:
     """Returns the time of a tick of a loop, µs; None where there was none. ``block`` is False when the run has ended.
 
-    The first block, which makes what later ones only use, is not counted; a run of a single block is counted whole.
+    The first block, which builds what later ones only use, is not counted; a run of a single block is counted whole.
     """
     took_s, goes_on = timed(block)
     ticks = tick()
@@ -178,9 +178,9 @@ def missing(store: Store, jobs: Sequence[Job], repeats: int) -> int:
 
 
 def measure(store: Store, jobs: Sequence[Job], repeats: int, name: str, stage: Stage) -> None:
-    """Makes every measurement of jobs of one way that is missing; where there are any, they are a stage of this name.
+    """Makes every missing measurement of jobs of one way, as a stage of this name if there are any.
 
-    With each ratio goes into the store the yardstick of its time, µs, and the load of the machine.
+    Each ratio is stored together with the yardstick's time around it, µs, and the load of the machine.
     """
     if not (count := missing(store, jobs, repeats)):
         return
@@ -198,7 +198,7 @@ def measure(store: Store, jobs: Sequence[Job], repeats: int, name: str, stage: S
                     assert before
                     assert after
                     mean = (before + after) / 2.0
-                    # How many processes run or wait for a core, of the last minute, where that can be known.
+                    # How many processes ran or waited for a core in the last minute, where that can be known.
                     is_known = way == IN_PROCESS and hasattr(os, "getloadavg")
                     seen = {"yardstick_us": mean, "load": os.getloadavg()[0] if is_known else None}
                     store.add(_QUIET + way, job.key, seen, repeat)
@@ -214,7 +214,7 @@ def yardstick() -> Scene:
 
 @contextmanager
 def _still() -> Iterator[None]:
-    """Keeps the garbage collector off what is alive now, and silences the warnings of runs that blow up."""
+    """Keeps the garbage collector away from what is alive now, and silences the warnings of runs that blow up."""
     gc.collect()
     gc.freeze()
     try:
@@ -232,7 +232,7 @@ def _warm(store: Store, jobs: Sequence[Job], repeats: int) -> None:
 
 
 def quiet(store: Store, jobs: Sequence[Job], repeats: int) -> Load | None:
-    """Returns the yardstick and the load of the machine beside these jobs; None where nothing was measured."""
+    """Returns the yardstick and the load of the machine around these jobs; None where nothing was measured."""
     seen = [one for job in jobs for one in store.all(_QUIET + job.way, job.key, repeats)]
     if len(seen) < 2:
         return None

@@ -1,1 +1,1 @@
-"""``haploop demo``: a wall that buzzes, why, and the element that steadies it, told from a run."""
+"""``haploop demo``: a wall that buzzes, why, and the element that steadies it, shown by a run."""

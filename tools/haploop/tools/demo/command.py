@@ -1,4 +1,4 @@
-"""The command ``haploop demo``; what it works with is imported when it is called."""
+"""The command ``haploop demo``; it imports what it works with when it is called."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def demo(
         "runs"
     ),
 ) -> None:
-    """Tell in seconds how a wall buzzes, why, and what steadies it. It is swapped in in mid-contact.
+    """Show in seconds how a wall buzzes, why, and what steadies it. The element is swapped in during contact.
 
     Plant, controller and logger run as three processes. The last line names the figure's file.
     """

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# So much of either side is drawn as loops of force against penetration, s.
+# How much of either side is drawn as loops of force against penetration, s.
 _LOOPS_S = 0.1
 _LETTERS = 118
 _PENETRATION = "penetration (mm); the area is energy given away"

@@ -1,4 +1,4 @@
-"""The demo's story in the terminal: the wall, why it swings, what the element did, both sides beside each other."""
+"""The demo's story in the terminal: the wall, why it swings, what the element did, both sides next to each other."""
 
 from __future__ import annotations
 
@@ -37,5 +37,5 @@ def report(story: Story) -> RenderableType:
 
 
 def _judged(summary: Mapping[str, Any]) -> str:
-    """Returns what sets the swing of a verdict's sentence apart from that of the run, which the table has."""
+    """Returns the words that set the swing in a verdict's sentence apart from that of the run, which the table has."""
     return ", with the hand held still and a push" if "stability" in summary else ""

@@ -57,7 +57,7 @@ class Part:
         return found.get("frequency_Hz") or None if remains else None
 
     def rows(self) -> list[tuple[str, str]]:
-        """Returns name and value of what there is to compare."""
+        """Returns name and value of everything to be compared."""
         return [
             ("verdict", self.verdict),
             ("proviso", "; ".join(self.provisos) or "–"),
@@ -74,7 +74,7 @@ class Story:
     Attributes:
         data: the run, with its log.
         at_s: time of the swap.
-        element: that was swapped in, with its parameters.
+        element: the element that was swapped in, with its parameters.
     """
 
     data: RunData

@@ -26,15 +26,15 @@ Answer = TypeVar("Answer")
 
 
 class ExecutorError(Exception):
-    """No worker can be had; the message says why and what to do."""
+    """No worker is available; the message says why and what to do."""
 
 
 class Executor:
-    """Runs calls; a context manager, at whose end the calls in flight are waited for, or dropped after an error.
+    """Runs calls; a context manager, which at its end waits for the calls in flight, or drops them after an error.
 
     Attributes:
-        count: calls run at once.
-        room: calls that are worth having under way.
+        count: how many calls run at once.
+        room: how many calls are worth having under way.
         worker_died: errors of a call whose worker died; all others in flight may raise them, too.
     """
 
@@ -43,11 +43,11 @@ class Executor:
     worker_died: tuple[type[BaseException], ...]
 
     def submit(self, call: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Has a call run; starts the workers when there are none."""
+        """Submits a call; starts the workers if there are none."""
         raise NotImplementedError
 
     def renew(self) -> None:
-        """Replaces workers that died, where nobody else does."""
+        """Replaces workers that died, where nothing else does."""
 
     def close(self, at_once: bool) -> None:
         """Ends the workers, if there are any: after the calls in flight, or now."""
@@ -60,9 +60,9 @@ class Executor:
 
 
 def make_executor(workers: int | None = None, dask: str | None = None) -> Executor:
-    """Makes the executor of ``workers`` processes, one a core when None, this one when 1, or of a Dask scheduler's.
+    """Makes an executor of ``workers`` processes (one per core when None, this one when 1) or of a Dask scheduler's.
 
-    Raises ExecutorError where there is no such cluster.
+    Raises ExecutorError if there is no such cluster.
     """
     if dask:
         return DaskExecutor(dask)
@@ -103,7 +103,7 @@ class InlineExecutor(Executor):
 
 
 class ProcessExecutor(Executor):
-    """Processes of this machine, started anew (spawned), one thread each.
+    """Newly spawned processes of this machine, one thread each.
 
     They hold one end of a pipe and end at once when the other is closed, by this object or the end of this process.
     """
@@ -137,7 +137,7 @@ class ProcessExecutor(Executor):
         self._executor = self._pipe = None
 
     def _start(self) -> None:
-        """Starts workers and sees that they do start: of one that cannot, every scene would seem to be at fault."""
+        """Starts workers and checks that they do start: if one cannot, every scene would seem to be at fault."""
         context = get_context("spawn")
         held, _ = self._pipe = context.Pipe(duplex=False)
         begin = partial(_begin, held, sources_brought())
@@ -153,7 +153,7 @@ class ProcessExecutor(Executor):
 
 
 class DaskExecutor(Executor):
-    """A Dask cluster that runs already; its scheduler finds new workers for those that died."""
+    """A Dask cluster that is already running; its scheduler finds new workers for those that died."""
 
     def __init__(self, address: str) -> None:
         try:
@@ -182,7 +182,7 @@ class DaskExecutor(Executor):
 
 
 def _begin(held: Connection, sources: tuple[tuple[str, str], ...]) -> None:
-    """Makes this process a worker: Ctrl-C is for the one that started it, and without that one it ends.
+    """Makes this process a worker: Ctrl-C is left to the process that started it, and it ends when that one does.
 
     ``sources`` are the plugin files that brought what scenes may name.
     """
@@ -204,7 +204,7 @@ def _bring(sources: tuple[tuple[str, str], ...]) -> None:
 
 
 def _called(sources: tuple[tuple[str, str], ...], packed: bytes) -> Any:
-    """Calls what was packed once its kinds are known here."""
+    """Runs a packed call once the kinds it needs are known here."""
     _bring(sources)
     call, arguments = pickle.loads(packed)
     return call(*arguments)

@@ -31,7 +31,7 @@ FRACTION = 0.02
 
 
 class Group(NamedTuple):
-    """Items that are run together where that can be, or that are known to be run one by one; a range will do."""
+    """Items to be run together if possible, or known to be run one by one; ``items`` may be a range."""
 
     items: Sequence[Any]
     together: bool
@@ -41,13 +41,13 @@ class Sizes:
     """Finds how many items the next part should have: few first, so that progress shows, then what their time allows.
 
     Args:
-        count: of all items, so that no worker has to wait long for another in the end; None where it is not known.
-        most: items of a part, which memory is proportional to.
+        count: number of all items, so that no worker has to wait long for another at the end; None if it is not known.
+        most: most items of a part; memory is proportional to it.
     """
 
     def __init__(self, workers: int, count: int | None = None, most: int = MOST) -> None:
         self._workers, self._left, self._most = workers, count, most
-        # Of parts that are run together, and one by one: the most the next may have, and the seconds an item took.
+        # For parts run together, and one by one: the most items the next may have, and the seconds an item took.
         self._largest, self._each_s = {True: FIRST, False: 1}, {True: 0.0, False: 0.0}
         self._began = time.monotonic()
 
@@ -69,7 +69,7 @@ class Sizes:
             self._left = max(0, self._left - items)
 
     def took(self, part: Group, seconds: float) -> None:
-        """Notes the seconds a part took; the next may be longer."""
+        """Records the seconds a part took; the next may be longer."""
         self._each_s[part.together] = seconds / len(part.items)
         self._largest[part.together] = max(self._largest[part.together], len(part.items) * GROWTH)
 
@@ -88,7 +88,7 @@ def cut(groups: Iterable[Group], sizes: Sizes) -> Iterator[Group]:
 def grouped(
     items: Iterable[Any], key: Callable[[Any], Hashable], window: int = 4 * MOST
 ) -> Iterator[tuple[Any, list[Any]]]:
-    """Yields each key with its items, looking so many items ahead."""
+    """Yields each key with its items, looking ``window`` items ahead."""
     source = iter(items)
     while block := list(itertools.islice(source, window)):
         groups: dict[Hashable, list[Any]] = {}
@@ -98,7 +98,7 @@ def grouped(
 
 
 class Pool:
-    """Workers that stay for several calls, as of ``make_executor``; a context manager."""
+    """Workers as of ``make_executor`` that are kept for several calls; a context manager."""
 
     def __init__(self, workers: int | None = None, dask: str | None = None) -> None:
         self._executor = make_executor(workers, dask)
@@ -119,7 +119,7 @@ class Pool:
         """Yields the index of each resolved scene and its result, in the order in which they come in.
 
         Scenes are taken a few thousand at a time; one that fails, or kills its worker, has a result with its reason.
-        ``energy`` and ``trajectories`` are as of ``haploop.launch.runs.in_batch.batch_results``.
+        ``energy`` and ``trajectories`` are as in ``haploop.launch.runs.in_batch.batch_results``.
 
         Raises:
             PluginError, ExecutorError: a plugin cannot be used, or no worker can be started.
@@ -137,15 +137,15 @@ class Pool:
     ) -> Generator[list[tuple[Any, Any]]]:
         """Does some work on items, part by part; no more than two parts a worker are under way.
 
-        When a worker dies, nobody knows which of the parts under way killed it. So each of them is then run by
-        itself, and one that kills its worker again is halved until the culprit stands alone.
+        When a worker dies, it is not known which of the parts under way killed it. So each of them is then run alone,
+        and one that kills its worker again is halved until the culprit stands alone.
 
         Args:
-            groups: of items that belong together; taken when there is room for them.
+            groups: groups of items that belong together; taken when there is room for them.
             stop: asked before each part; True ends the work after those under way.
 
         Yields:
-            Each item of a part that is done with what is kept of it.
+            For each finished part, its items, each with what is kept of it.
 
         Raises:
             PluginError, ExecutorError: a plugin does not load in a worker, or no worker can be started.
@@ -161,7 +161,7 @@ class Pool:
                     return
                 done = wait(flying, _POLL_S, FIRST_COMPLETED).done  # now and then to ask whether to stop
                 if not all(map(self._outcome, done)):
-                    done = wait(flying).done  # what else is under way has died with it, or will soon be done
+                    done = wait(flying).done  # the others under way have died with it, or will soon be done
                 suspects: list[Group] = []
                 for future in done:
                     part = flying.pop(future)
@@ -206,7 +206,7 @@ class Pool:
 
 
 def read_sources(plugins: Iterable[Path]) -> tuple[tuple[str, str], ...]:
-    """Reads plugin files for workers, which have none of their own, as (path, text); PluginError for one of no use."""
+    """Reads plugin files for workers, which have none of their own, as (path, text); PluginError for an unusable one."""
     for path in plugins:
         load_plugin(path)
     return tuple((str(path), path.read_text(encoding="utf-8")) for path in map(Path, plugins))

@@ -28,7 +28,7 @@ class Work:
 
     Attributes:
         make: from an item to its resolved scene; an error that it raises is the reason why the item is refused.
-        keep: from an item, its scene (None where it was refused) and its result to what travels back: by default all.
+        keep: from an item, its scene (None if it was refused) and its result to what is sent back: by default all.
         sources: plugin files as (name, text); a worker on another machine has no files of this one.
     """
 
@@ -40,7 +40,7 @@ class Work:
     compiled: bool = False
 
     def run(self, items: Sequence[Any]) -> tuple[float, list[Any]]:
-        """Runs the items; returns the seconds all of it took, and what is kept of every item.
+        """Runs the items; returns the seconds that took in all, and what is kept of every item.
 
         Raises:
             PluginError: a plugin does not load here.
@@ -81,7 +81,7 @@ class Work:
 
 
 def _safely(results: Results, scenes: dict[int, Scene], left: list[int]) -> Iterator[tuple[int, Summary]]:
-    """Yields every result; where a scene raises, those without a result are run in halves until it stands alone."""
+    """Yields every result; if a scene raises, those without a result are run in halves until it stands alone."""
     done: set[int] = set()
     try:
         for place, result in results([scenes[index] for index in left]):
@@ -100,7 +100,7 @@ def _safely(results: Results, scenes: dict[int, Scene], left: list[int]) -> Iter
 def load_kinds(sources: Sources) -> dict[str, type[Element]]:
     """Loads the element kinds at hand, the installed ones and those of these sources, once in this process.
 
-    Raises PluginError where one does not load.
+    Raises PluginError if one does not load.
     """
     from haploop.controller.dissipation import registry
     from haploop.controller.dissipation.registry import load_source

@@ -5,8 +5,8 @@ NPZ: an array for every column, ``numpy.load(file)["plant/x"]``; beside them ``u
 gives as bytes.
 
 MCAP, which Foxglove opens and plots: one message for every row, schemas with units and titles. Topics and names are
-kept: a plot's path is ``/plant.x``, or ``/energy."wall.true"`` where the name has a point in it. A number that is not
-finite, or that a row does not have, is left out of its message: JSON has no word for it, and the schemas that Foxglove
+kept: a plot's path is ``/plant.x``, or ``/energy."wall.true"`` if the name has a point in it. A number that is not
+finite, or that a row does not have, is left out of its message: JSON cannot express it, and the schemas that Foxglove
 reads allow no null.
 """
 
@@ -34,7 +34,7 @@ _EVENT_UNITS = {TIMESTAMP: "s", "tick": ""}
 
 
 class NpzWriter(ExportWriter):
-    """Writes one archive; it takes its members one after the other, so every column waits in a file of its own."""
+    """Writes one archive; its members are written one after the other, so every column waits in a file of its own."""
 
     suffix = ".npz"
 

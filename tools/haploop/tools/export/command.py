@@ -26,7 +26,7 @@ FORMATS = tuple(WRITERS)
 
 
 class ExportFailed(Exception):
-    """Raised where the files could not be written to their end; the message says why, and none of them is left."""
+    """Raised if the files could not be written to their end; the message says why, and none of them is left."""
 
 
 def export_run(path: Path, to: str, out: Path | None, topics: str | None, force: bool) -> None:
@@ -87,13 +87,13 @@ def _targets(log: Path, out: Path | None, writer: type[ExportWriter], topics: li
 
 @contextlib.contextmanager
 def new_files(targets: Sequence[Path], replace: bool) -> Iterator[list[IO[bytes]]]:
-    """Opens a file for each target, under the target's name with ``.part`` after it; they take their names at the end.
+    """Opens a file for each target, under the target's name with ``.part`` after it, and renames them all at the end.
 
-    When something raises on the way, no part is left and the files that had the names stay.
+    If something raises on the way, no part is left, and files that had these names before are kept.
 
     Raises:
         OutputError: a target exists already and ``replace`` is not set, or a file cannot be made.
-        ExportFailed: the operating system refuses to write on.
+        ExportFailed: the operating system refuses to write further.
     """
     for target in targets:
         if target.is_dir() or (target.exists() and not replace):

@@ -1,9 +1,9 @@
 """The base of every export format; CSV and Apache Parquet: a file for every topic, a column for every quantity.
 
-CSV: UTF-8, one header line, ``timestamp (s),x (m)``; a pure number has its name alone. Numbers have as many digits as
-it takes to read back the same float64, a NaN is an empty cell, an infinite number is ``inf`` or ``-inf``. So one call
-of ``pandas.read_csv``, or a double click on the file, does; pandas before 3 rounds the last bit of some numbers, unless
-told ``float_precision="round_trip"``.
+CSV: UTF-8, one header line, ``timestamp (s),x (m)``; a pure number has only its name. Numbers have as many digits as it
+takes to read back the same float64, a NaN is an empty cell, an infinite number is ``inf`` or ``-inf``. So one call of
+``pandas.read_csv``, or a double click on the file, is enough; pandas before 3 rounds the last bit of some numbers,
+unless told ``float_precision="round_trip"``.
 
 Parquet: float64 columns; ``pyarrow.parquet.read_schema(file).field("x").metadata[b"unit"]`` is the unit of a column;
 pandas and polars read the files as they are, and pandas has the units in ``attrs["units"]``.
@@ -34,14 +34,14 @@ MESSAGE = "message"
 MAP_UNITS = {TIMESTAMP: "s", MESSAGE: ""}
 # Key of a Parquet file's metadata from which pandas takes the ``attrs`` of a frame, as JSON.
 _PANDAS = "PANDAS_ATTRS"
-# Rows of a group of a Parquet file, which a reader can read by itself.
+# Rows of a group of a Parquet file; a reader can read each group alone.
 _GROUP_ROWS = 1 << 16
 
 
 class ExportWriter(ABC):
     """Writes the content of a log into a file, or one for every topic, in the memory of a few batches.
 
-    A context manager, which releases what is held beside the files.
+    A context manager, which releases what it holds besides the files.
     """
 
     suffix: ClassVar[str]
@@ -52,13 +52,13 @@ class ExportWriter(ABC):
         """Begins the files.
 
         Args:
-            files: one a topic in the order of ``units``, or one for all; closed by the caller.
-            units: by topic, unit by column of all that will come; empty for a topic of free maps.
+            files: one per topic in the order of ``units``, or one for all; closed by the caller.
+            units: for each topic, the unit by column of all columns to come; empty for a topic of free maps.
         """
 
     @abstractmethod
     def add(self, batch: Batch) -> None:
-        """Takes the next rows of a topic; a column that they do not have is NaN in them."""
+        """Takes the next rows of a topic; a column that they lack is NaN in them."""
 
     def finish(self) -> None:  # noqa: B027 (CSV holds nothing back)
         """Writes all that was held back; to be called once, when nothing has failed."""
@@ -71,13 +71,13 @@ class ExportWriter(ABC):
 
 
 def read_column(batch: Batch, name: str) -> Floats:
-    """Returns a column of a batch, NaN throughout where it has none of the name."""
+    """Returns a column of a batch, NaN throughout if it has none of this name."""
     assert isinstance(batch.rows, Table)
     return batch.rows[name] if name in batch.rows else np.full(len(batch.log_times_ns), np.nan)
 
 
 def to_json(value: Any) -> str:
-    """Returns compact JSON; null for numbers that are not finite, text for what JSON does not know."""
+    """Returns compact JSON; null for numbers that are not finite, text for values that JSON does not know."""
     return json.dumps(finite(value), ensure_ascii=False, separators=(",", ":"), default=str)
 
 

@@ -19,7 +19,7 @@ def export_fmu(
 ) -> None:
     """Write the controller of a scene as an FMU, position to force. FMI 3.0, co-simulation, in C.
 
-    Wall, elements, estimators and delay, without Python, to the bits of a run. It takes a C compiler.
+    Wall, elements, estimators and delay, without Python, with the same bits as a run. It needs a C compiler.
     """
     from haploop.launch.scene.file import load
     from haploop.protocol.ticks import Timebase

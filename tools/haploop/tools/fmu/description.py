@@ -46,7 +46,7 @@ _UNIT = '\n    <Unit name="{}"><BaseUnit {}/></Unit>'
 _VARIABLE = """
     <Float64 name="{name}" valueReference="{at}" causality="{causality}" variability="{variability}" unit="{unit}"
       description="{about}"{limits}/>"""
-# By which importers compile the sources for other machines.
+# The file with which importers compile the sources for other machines.
 BUILD = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiBuildDescription fmiVersion="3.0">
   <BuildConfiguration modelIdentifier="{identifier}">
@@ -69,7 +69,7 @@ def model_description(scene: Scene, variables: list[Variable], identifier: str, 
         stop=float(scene.duration),
         units="".join(_UNIT.format(*UNITS[unit]) for unit in dict.fromkeys(each.unit for each in variables)),
         variables="".join(_variable(at, each) for at, each in enumerate(variables)),
-        # A command that is on its way does not depend on the position of now.
+        # A command that is already on its way does not depend on the present position.
         dependencies=' dependencies=""' if time.delay_steps else "",
     )
 

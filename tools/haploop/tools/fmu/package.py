@@ -1,4 +1,4 @@
-"""The FMU of a scene's controller: model description, sources and the library compiled of them, in one archive."""
+"""The FMU of a scene's controller: model description, sources and the library compiled from them, in one archive."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from haploop.tools.fmu.description import BUILD, model_description
 from haploop.tools.fmu.variables import controller_of, header, variables_of
 
 SOURCES = ("fmi3.c", "controller.h")
-# No multiply-add in one rounding, which Python does not do either.
+# No multiply-add with a single rounding, which Python does not do either.
 _FLAGS = ("-O2", "-std=c99", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden")
 _MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
 _SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib")}
@@ -33,7 +33,7 @@ class NotCompiled(Exception):
 
 
 def make_fmu(scene: Scene, stem: str) -> bytes:
-    """Makes the FMU of a resolved scene's controller; the same scene and ``stem`` of its identifier, the same bytes.
+    """Makes the FMU of a resolved scene's controller; the same scene and ``stem`` (its identifier) give the same bytes.
 
     Raises:
         NotExportable: no FMU can be made of this scene.
@@ -58,7 +58,7 @@ def make_fmu(scene: Scene, stem: str) -> bytes:
     made = BytesIO()
     with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in contents.items():
-            entry = zipfile.ZipInfo(name)  # of 1980, whenever it is made
+            entry = zipfile.ZipInfo(name)  # dated 1980, whenever it is made
             entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
             archive.writestr(entry, data)
     return made.getvalue()

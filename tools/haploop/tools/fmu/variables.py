@@ -40,7 +40,7 @@ _INPUTS = {"encoder": "OF_VELOCITY", "accelerometer": "OF_ACCELEROMETER", "kalma
 
 
 class NotExportable(Exception):
-    """A scene whose controller no FMU can be made of; the message names all that stands in the way."""
+    """A scene from whose controller no FMU can be made; the message names everything that prevents it."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ class Variable:
     """A variable of the FMU; its place in the list is its reference.
 
     Attributes:
-        name: that of the scene's key, where it has one.
-        symbol: by which the C knows its reference; "" for the parameter of an element.
-        least: of what may be set, to ``MEANT`` of the unit.
+        name: that of the scene's key, if it has one.
+        symbol: the name of its reference in the C code; "" for the parameter of an element.
+        least: the least that may be set; the most is ``MEANT`` of the unit.
     """
 
     name: str
@@ -68,10 +68,10 @@ class Variable:
 
 
 def controller_of(scene: Scene) -> ControllerParams:
-    """Returns the controller of a resolved scene, of which an FMU can be made.
+    """Returns the controller of a resolved scene from which an FMU can be made.
 
     Raises:
-        NotExportable: C has no words for an element or an estimator; commands are drawn or changed in mid-run.
+        NotExportable: the C code lacks an element or an estimator; commands are drawn or changed in mid-run.
     """
     params = make_params(scene, Timebase.from_scene(scene).period_s, registry())
     found = list(_obstacles(scene, params))
@@ -101,7 +101,7 @@ def _obstacles(scene: Scene, params: ControllerParams) -> Iterator[str]:
 
 
 def _unfiltered(estimator: Estimator) -> tuple[Estimator, float]:
-    """Returns an estimator without its low-pass, and the gain of that, 0 for none."""
+    """Returns an estimator without its low-pass, and the gain of that low-pass, 0 if there is none."""
     return (estimator.raw, estimator.gain) if isinstance(estimator, LowPass) else (estimator, 0.0)
 
 
@@ -137,12 +137,12 @@ def variables_of(scene: Scene, params: ControllerParams) -> list[Variable]:
 
 
 def step_count(time: Timebase) -> int:
-    """Returns the plant steps of the longest communication step at whose every end alone the force changes."""
+    """Returns the longest communication step, in plant steps, such that the force changes only at the ends of steps."""
     return math.gcd(time.steps_per_tick, time.delay_steps)
 
 
 def header(scene: Scene, params: ControllerParams, variables: list[Variable], token: str) -> str:
-    """Returns ``scene.h``: all that is the scene's own, numbers written so that no bit is lost."""
+    """Returns ``scene.h``: everything specific to the scene, with numbers written so that no bit is lost."""
     time = Timebase.from_scene(scene)
     optional = "ACCELERATION ENCODER_RESOLUTION WALL_POSITION WALL_STIFFNESS ACTUATOR_RESOLUTION ACTUATOR_SATURATION"
     references = dict.fromkeys(optional.split(), 0) | {v.symbol: i for i, v in enumerate(variables) if v.symbol}

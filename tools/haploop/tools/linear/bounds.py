@@ -1,4 +1,4 @@
-"""Known analytic bounds of wall stiffness, each with its source, and whether it speaks of a given scene."""
+"""Known analytic bounds of wall stiffness, each with its source, and whether it applies to a given scene."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from haploop.tools.linear.linearity import Kinds, LinearController, installed_ki
 
 # Gil et al. leave out what grows with the square of this: the angle in rad by which the wall's swing turns in T/2 + td.
 _SMALL_ANGLE = 0.3
-# Angles theta = w T in rad at which passivity is looked at first; below the least nothing changes any more.
+# Angles theta = w T in rad at which passivity is checked first; below the least nothing changes any more.
 _LEAST_ANGLE, _ANGLES = 1e-4, 1000
 
 
@@ -27,9 +27,9 @@ class Bound:
 
     Attributes:
         name: authors and year, short enough for a label.
-        formula: in the field's letters: K, B virtual and b physical; T the period, td the delay.
+        formula: in the field's symbols: K, B virtual and b physical; T the period, td the delay.
         domain: for what it was derived.
-        kind: passive with whatever passive hand, or stable with the scene's own.
+        kind: passive with any passive hand, or stable with the scene's own.
         stiffness_N_m: the largest stiffness it allows, 0 where it allows none; None where it does not apply.
         why_not: what takes the scene out of its domain, one sentence; empty where it applies.
     """
@@ -52,7 +52,7 @@ class _DoesNotApply(Exception):
 
 
 def bounds_of(scene: Scene, kinds: Kinds | None = None) -> list[Bound]:
-    """Returns all known bounds of a resolved scene's wall, those that do not apply among them."""
+    """Returns all known bounds of a resolved scene's wall, including those that do not apply."""
     kinds, scene = installed_kinds() if kinds is None else kinds, with_spring(scene)
     return [_bound(about, stiffness, scene, kinds) for stiffness, about in _KNOWN.items()]
 
@@ -65,7 +65,7 @@ def _bound(about: Bound, stiffness: Callable[[Scene, Kinds], float], scene: Scen
 
 
 def _refuse(scene: Scene, kinds: Kinds, *outside: str, friction: bool = False) -> None:
-    """Raises where the loop is not linear, unless by friction where that is allowed, or some of ``_OUTSIDE`` holds."""
+    """Raises if the loop is not linear, except for friction where that is allowed, or if one of ``outside`` holds."""
     curved = [what for what in why_not_linear(scene, kinds) if not (friction and what == "[friction]")]
     if curved:
         raise _DoesNotApply(f"The scene has {', '.join(curved)}.")

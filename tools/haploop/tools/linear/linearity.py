@@ -52,10 +52,10 @@ def why_not_linear(scene: Scene, kinds: Kinds | None = None) -> list[str]:
 
 
 def with_spring(scene: Scene) -> Scene:
-    """Returns a scene whose wall is a spring, with an element of its damping: in lasting contact the same loop.
+    """Returns a scene whose wall is a spring, with an element that has its damping: in lasting contact the same loop.
 
-    That a damped spring never pulls is left out; where small swings around a depth do not come to it, nothing is.
-    A wall that is no spring and damper stays.
+    That a damped spring never pulls is left out; nothing is for small swings around a depth that do not come to that.
+    A wall that is not a spring and damper is kept.
     """
     known = make_wall(scene.wall).stiffness_and_damping()
     if scene.wall is None or known is None or not scene.wall.kind:
@@ -66,7 +66,7 @@ def with_spring(scene: Scene) -> Scene:
 
 
 def _is_linear(element: Element) -> bool:
-    """Tells whether the force is linear in the motion alone; the wall's, which some ask for, is added only later."""
+    """Tells whether the force is linear in the motion alone; the wall's force, which some use, is added only later."""
     return element.linear and not element.asks and not keeps_attributes(element)
 
 
@@ -91,10 +91,10 @@ class LinearController(NamedTuple):
 
     @classmethod
     def from_scene(cls, scene: Scene, kinds: Kinds) -> LinearController:
-        """Finds that of a resolved scene of which ``why_not_linear`` has nothing to say.
+        """Finds the system of a resolved scene for which ``why_not_linear`` returns nothing.
 
         By superposition: a batch is ticked whose member i has a state, or a sample, of 1 in place i and 0 elsewhere.
-        Its next state is A and B, row by row. Whole numbers of the state count ticks; they are run to where they stay.
+        Its next state is A and B, row by row. Whole numbers in the state count ticks; they are run until they stay.
         """
         period_s, inputs = 1.0 / scene.clock.control_rate, 1 + accelerometer_is_used(scene)
         params = make_params(replace(scene, wall=_ALWAYS_INSIDE), period_s, dict(kinds))

@@ -17,20 +17,20 @@ from haploop.protocol.ticks import Timebase
 from haploop.tools.linear.linearity import Kinds, LinearController, installed_kinds, why_not_linear, with_spring
 from haploop.tools.search.bisect import bisect
 
-# No wall is softer than this, and none stiffer is looked at.
+# No wall is softer than the first, and none stiffer than the second is considered.
 _LEAST_N_M, _MOST_N_M = 1e-3, 1e12
-# So near to a crossing as computed the end of a range is looked for first.
+# The end of a range is first looked for this near to a computed crossing, as a share of it.
 _NEAR = 1e-9
-# Roots this near the unit circle are tried for crossings; what is none among them is harmless.
+# Roots this near the unit circle are tried as crossings; those that are none do no harm.
 _NEAR_THE_CIRCLE = 1e-3
 
 
 class NotLinear(ValueError):
-    """A scene whose loop in contact is no linear map; the message names what makes it none."""
+    """A scene whose loop in contact is not a linear map; the message names what makes it nonlinear."""
 
 
 class NeverStable(ValueError):
-    """A loop that grows however soft its wall is."""
+    """A loop whose motion grows however soft its wall is."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class OneTickMap:
         """Returns the map of a resolved scene in contact, with a wall or without; ``left_out`` says what it lacks.
 
         Raises:
-            NotLinear: the loop is no linear map, as ``why_not_linear`` tells.
+            NotLinear: the loop is not a linear map, for the reasons that ``why_not_linear`` gives.
         """
         kinds = installed_kinds() if kinds is None else kinds
         if curved := why_not_linear(scene, kinds):
@@ -172,7 +172,7 @@ def _crossings(without_wall: np.ndarray, pushed: np.ndarray) -> list[float]:
 
     det(z - M) = det(z - A) (1 + K G(z)) with G(z) = q' (z - A)^-1 p, so that on the circle G must be real there:
     G(z) = G(1/z), which is a generalised eigenvalue problem in z, and K = -1 / G(z). Being exact it also finds windows
-    of stability however narrow. The list may hold more than crossings: what touches, and what rounding moves.
+    of stability however narrow. The list may hold more than crossings: touching points, and what rounding moves.
     """
     a, (scales, _) = matrix_balance(without_wall, permute=False, separate=True)  # numbers of like size, G kept
     b, c = pushed / scales, np.zeros(len(pushed))

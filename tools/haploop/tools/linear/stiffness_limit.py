@@ -1,4 +1,4 @@
-"""The largest wall stiffness that stays stable, from the one-tick map, and two runs that hold it to the program."""
+"""The largest wall stiffness that stays stable, from the one-tick map, and two runs that check it with the program."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from haploop.protocol.scene.scene import Hand, Scene, Wall
 from haploop.tools.linear.one_tick import OneTickMap
 
 BELOW, ABOVE = 0.97, 1.03
-# The surface is this far from where the loop rests inside the wall; its swings start with this and must change by this.
+# How far inside the wall the loop rests, the amplitude its swings start with, and the factor by which they must change.
 _DEPTH_M, _START_M, _CHANGE = 2e-3, 3e-6, 100.0
 # Links that are stretched and an actuator that lags start with swings of up to the depth: it is then less.
 _DEPTH_OF_MORE_STATES_M = 6e-5
@@ -38,7 +38,7 @@ class StiffnessLimit:
 
 
 def stiffness_limit(scene: Scene, kinds: dict[str, type[Element]]) -> StiffnessLimit:
-    """The limit of a resolved scene's loop, confirmed by a run on either side; NotLinear, NeverStable without one."""
+    """The limit of a resolved scene's loop, checked by a run on either side; raises NotLinear, NeverStable without one."""
     limit = OneTickMap.from_scene(scene, kinds).stiffness_limit()
     verdicts = [run_in_process(pressed_deep(scene, share * limit, kinds), kinds)["verdict"] for share in (BELOW, ABOVE)]
     return StiffnessLimit(limit, *verdicts)
@@ -68,7 +68,7 @@ def pressed_deep(scene: Scene, stiffness: float, kinds: dict[str, type[Element]]
 
 
 def smooth(scene: Scene) -> Scene:
-    """The scene without what its one-tick map leaves out; a Kalman filter keeps the gains that it has with it."""
+    """The scene without what its one-tick map leaves out; a Kalman filter keeps the gains that it has with that."""
     rough = [key for effect in all_effects() for key in effect.left_out]
     smoothed = without(scene, "event", *rough)
     if scene.velocity and scene.velocity.estimator == "kalman":

@@ -1,4 +1,4 @@
-"""A loop in its builder's terms: what swings, how stiff a wall may be, what one count of the encoder comes to."""
+"""A loop in its builder's terms: what swings, how stiff a wall may be, what one count of the encoder causes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from haploop.tools.linear.bounds import bounds_of
 from haploop.tools.linear.linearity import Kinds, is_linear, why_not_linear
 from haploop.tools.linear.one_tick import NeverStable, NotLinear, OneTickMap
 
-# Counts inside the wall from which one is gone, ticks of rest before it and ticks watched after it.
+# Counts inside the wall at which a step of one count is made; ticks of rest before it, and as many watched after it.
 DEEP_COUNTS, _TICKS = 1000, 500
 
 
@@ -26,8 +26,8 @@ class Limit:
 
     Attributes:
         kind: "passivity" with any passive hand, or "stability" with the scene's own.
-        stiffness_N_m: None where it does not speak of the scene, for which ``why_not`` is the reason; of that
-            without friction it says so.
+        stiffness_N_m: None where the limit does not apply to the scene; ``why_not`` gives the reason, or says that the
+            limit is of the loop without friction.
     """
 
     name: str
@@ -37,21 +37,21 @@ class Limit:
 
 
 def limits_of(scene: Scene, kinds: Kinds) -> list[Limit]:
-    """Returns all known bounds, then where the map M of one tick stops being stable, rho(M) = 1, from a soft wall on.
+    """Returns all known bounds, then where the one-tick map M stops being stable, rho(M) = 1, from a soft wall on.
 
-    Where there are elements, the last is that of the wall alone. Of a loop that friction alone keeps from being linear
-    it is that of the same loop without friction.
+    If there are elements, the last is that of the wall alone. For a loop that only friction keeps from being linear, it
+    is that of the same loop without friction.
     """
     found = [Limit(bound.name, bound.kind, bound.stiffness_N_m, bound.why_not) for bound in bounds_of(scene, kinds)]
     found.append(_of_map("rho(M) = 1", scene, kinds))
-    # A spring asks for no velocity, so that what estimates it is out of the loop, too.
+    # A spring needs no velocity, so the velocity's estimator is not in the loop either.
     is_spring = scene.wall is None or not scene.wall.kind
     alone = replace(scene, dissipation=(), **{"velocity": None, "acceleration": None} if is_spring else {})
     return [*found, *([_of_map("rho(M) = 1, wall alone", alone, kinds)] if scene.dissipation else [])]
 
 
 def _of_map(name: str, scene: Scene, kinds: Kinds) -> Limit:
-    """Returns the exact limit of a loop, or that of the loop without friction where friction alone is in the way."""
+    """Returns the exact limit of a loop, or that of the loop without friction if only friction is in the way."""
     smooth = replace(scene, friction=None)
     if not scene.friction or not is_linear(smooth, kinds):
         return _exact(name, scene, kinds)
@@ -80,7 +80,7 @@ def modes(scene: Scene) -> list[Mode]:
     """Returns |s| / 2 pi and -Re s / |s| of every pair of complex eigenvalues s, slow ones first.
 
     Of one mass m, damped by b, on the hand's spring k and the wall's K they are sqrt((K + k) / m) / 2 pi and
-    b / (2 sqrt((K + k) m)), b with the damping of the wall. None of a wall whose stiffness changes with the depth.
+    b / (2 sqrt((K + k) m)), b with the damping of the wall. Empty for a wall whose stiffness changes with the depth.
     """
     known = make_wall(scene.wall).stiffness_and_damping()
     if known is None:
@@ -97,7 +97,7 @@ def modes(scene: Scene) -> list[Mode]:
 
 @dataclass(frozen=True)
 class OneCount:
-    """The largest that a step of one count makes of every estimate and force, deep in contact and from rest.
+    """The largest change of every estimate and force by a step of one count, deep in contact and from rest.
 
     Attributes:
         elements_N: by element, in the scene's order.
@@ -111,7 +111,7 @@ class OneCount:
 
 
 def one_count(scene: Scene, kinds: Kinds) -> OneCount | None:
-    """Returns what the scene's own controller makes of one count of its encoder, to either side; None without one."""
+    """Returns how the scene's own controller responds to one count of its encoder, to either side; None without one."""
     if scene.encoder is None:
         return None
     count_m, wall = scene.encoder.resolution, scene.wall

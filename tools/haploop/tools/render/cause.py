@@ -74,7 +74,7 @@ def _cause_by_trial(without: Mapping[str, str]) -> str:
 
 
 def cause(energy: Summary, when: str = "In all") -> str:
-    """Returns where a swing has its energy from, given a summary's ``energy``; nothing of books without a wall."""
+    """Returns where a swing gets its energy from, given a summary's ``energy``; "" for books without a wall."""
     if "leak" not in energy["wall"] or energy["wall"]["leak"]["total_J"] is None:
         return ""
     leak = energy["wall"]["leak"]
@@ -83,7 +83,7 @@ def cause(energy: Summary, when: str = "In all") -> str:
     most_J, element = max(fed, default=(0.0, ""))
     if most_J > max(0.0, -leak["total_J"]):
         return _ELEMENT.format(when=when, element=element, energy=amount(most_J, "J")) + _limited(energy, most_J)
-    if energy["wall"].get("true_J") == 0.0:  # as where its first force comes after the end
+    if energy["wall"].get("true_J") == 0.0:  # such as when its first force comes after the end
         return _NOTHING.format(when=when)
     if leak["total_J"] >= 0.0 or not (total := sum(given.values())):
         return _NONE.format(when=when)

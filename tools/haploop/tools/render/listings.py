@@ -1,4 +1,4 @@
-"""Tables on the terminal of what there is: the state of live runs, what comes with haploop, the kinds of element."""
+"""Tables on the terminal that list what there is: live runs and their state, what comes with haploop, element kinds."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def plugins_table(kinds: Mapping[str, type[Element]]) -> Table:
     table = make_table("kind", "what it does", "parameters", unbroken=("kind",))
     for kind, element in kinds.items():
         about = (element.__doc__ or "").strip().partition("\n")[0]
-        about = "" if about.startswith(f"{element.__name__}(") else about  # what a dataclass says of itself
+        about = "" if about.startswith(f"{element.__name__}(") else about  # the docstring that a dataclass generates
         lines = [_parameter(name, *declared) for name, declared in element.parameters().items()]
         # As text: a formula's v[k] is no markup.
         table.add_row(kind, Text(about), Text("\n".join(lines) or "–"))

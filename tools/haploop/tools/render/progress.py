@@ -29,7 +29,7 @@ _WORDS, _LEAST_BAR, _MOST_BAR = 70, 4, 24
 
 
 class ProgressLine:
-    """One live line while a run goes on, gone when it ends; nothing where there is no terminal. A context manager.
+    """One live line while a run goes on, gone when it ends; nothing without a terminal. A context manager.
 
     Args:
         duration_s: simulated time of the run.
@@ -110,9 +110,9 @@ def silent(_name: str, _count: int) -> Callable[[], None]:
 
 @contextmanager
 def bars() -> Iterator[Stage]:
-    """Shows a bar a stage on a terminal's stderr, and lines elsewhere: ``NAME: 3 of 10``, ten a stage at most.
+    """Shows a bar per stage on a terminal's stderr, and lines elsewhere: ``NAME: 3 of 10``, at most ten per stage.
 
-    They move after each part only: a thread that drew meanwhile would disturb what is measured.
+    They are redrawn only after each part: a thread that drew in between would disturb what is measured.
     """
     from rich import progress
 

@@ -40,7 +40,7 @@ _COUNTS = (
 )
 # The causes of a wall's leak by their keys in the summary.
 HELD, LAW_TAKES = "stored by an ideal wall at the end", "taken by its law"
-# The damping of a wall goes by the estimated velocity.
+# The damping of a wall acts on the estimated velocity.
 _OF_DAMPING = {"quantisation_J": "quantisation and estimates"}
 LEAK_CAUSES = {"sampling_and_hold_J": "sampling and hold", "quantisation_J": "quantisation", "delay_J": "delay"}
 
@@ -72,8 +72,9 @@ def print_summary(summary: Summary, notes: Sequence[Note] = ()) -> None:
 def summary_table(summary: Summary, notes: Sequence[Note] = ()) -> RenderableType:
     """Makes the report of a run from its summary: verdict, key numbers and every book of energy.
 
-    Of ``notes`` on its scene those on why the device does not touch the wall stand at the verdict of one that did not;
-    what there are stand at the end, beside the verdict, since the report is longer than many a terminal.
+    Of the ``notes`` on its scene, those on why the device does not touch the wall stand at the verdict of a run without
+    contact. How many notes there are stands at the end, beside the verdict, since the report is longer than many a
+    terminal.
     """
     from rich.console import Group
     from rich.text import Text
@@ -81,7 +82,7 @@ def summary_table(summary: Summary, notes: Sequence[Note] = ()) -> RenderableTyp
     word = told(summary)
     provisos = _provisos(summary.get("stability", {}))
     head = Text.assemble((word, verdict_style(word)), (provisos, "bold yellow"), "  ", (summary["title"], "bold"))
-    # Of the rule of a window the measures alone, without the limits they were held against.
+    # Of a window's rule only the measures, without the limits they were compared with.
     rule = summary["verdict_rule"] if "stability" in summary else summary["verdict_rule"].partition("; ")[0]
     rule = rule.rstrip(".")
     parts: list[RenderableType] = [head, Text(f"{rule[:1].upper()}{rule[1:]}.", style="dim")]
@@ -137,7 +138,7 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
 
 
 def lateness_rows(of: Summary) -> list[tuple[str, str]]:
-    """Returns how late the ticks of a run in real time were, or the answers to its device; nothing for any other."""
+    """Returns how late the ticks of a run in real time were, or the answers to its device; empty for any other run."""
     if not (late := of.get("lateness")):
         return []
     if "ticks" not in late:
@@ -154,7 +155,7 @@ def lateness_rows(of: Summary) -> list[tuple[str, str]]:
 
 
 def leak_rows(wall: Summary) -> dict[str, float | None]:
-    """Returns the leak of a summary's wall by cause, and what it takes and holds, J; nothing for one without a leak."""
+    """Returns the leak of a summary's wall by cause, and what it takes and holds, J; empty for one without a leak."""
     if "leak" not in wall:
         return {}
     causes = LEAK_CAUSES | (_OF_DAMPING if "dissipated_J" in wall else {})
@@ -212,7 +213,7 @@ def finding_table(finding: Finding) -> RenderableType:
 
 
 def _stability(found: Summary) -> list[tuple[str, str]]:
-    """Returns what a loop does, held still and pushed at its end; nothing where it was not watched to an answer."""
+    """Returns what a loop does, held still and pushed at its end; empty if it was not watched to an answer."""
     if found.get("rate_1_s") is None:
         return []
     rows = [("held still and pushed, it swings", swing_words(found))]
@@ -252,5 +253,5 @@ def rests(found: Summary) -> bool:
 
 
 def program_rows(data: Message) -> list[tuple[str, str]]:
-    """Returns role and program of what is not haploop's own, of a status or a summary."""
+    """Returns role and program of every node that is not haploop's own, from a status or a summary."""
     return [(f"{role} not haploop's own", described(p)) for role, p in data.get("programs", {}).items() if not p["own"]]

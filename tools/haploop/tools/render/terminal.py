@@ -44,7 +44,7 @@ def as_text(shown: RenderableType) -> str:
 
 
 def seen(verdict: str) -> str:
-    """Returns the word for what the last half second shows, in a file of an earlier version, too."""
+    """Returns the word for what the last half second shows, also for a verdict in a file of an earlier version."""
     from haploop.logger.verdict.measures import OF_WINDOW
 
     word = OF_WINDOW.get(verdict, verdict)
@@ -76,8 +76,8 @@ def make_table(
 ) -> Table:
     """Makes a table with a line below its heads and no other.
 
-    Cells below ``numbers`` are set to the right and, as those below ``unbroken``, stay on one line. Widths, in letters,
-    are of the columns of numbers and of the first one; padding is top, right, bottom, left.
+    Cells below ``numbers`` are right-aligned and, like those below ``unbroken``, stay on one line. ``least_width`` is
+    of the columns of numbers, ``first_width`` of the first one, in letters; ``padding`` is top, right, bottom, left.
     """
     from rich import box
     from rich.table import Table
@@ -106,7 +106,7 @@ def make_facts(rows: Iterable[tuple[str, str | Text]], least_width: int | None =
 
 
 def markdown_table(heads: Sequence[str], rows: Iterable[Sequence[str]], numbers: Collection[int] = ()) -> str:
-    """Returns a table in Markdown; ``numbers`` are the places of the columns set to the right. Bars are escaped."""
+    """Returns a table in Markdown; ``numbers`` are the places of the right-aligned columns. Bars are escaped."""
     rule = ["---:" if place in numbers else "---" for place in range(len(heads))]
     lines = [[cell.replace("\\|", "|").replace("|", "\\|") for cell in line] for line in (heads, rule, *rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -53,9 +53,9 @@ def spring(stiffness_N_m: float | None) -> str:
 
 
 def parameters(table: dict[str, Any], units: Mapping[str, str] = _NO_UNITS) -> str:
-    """Returns an element's parameters in short, ``"mass 0.01 kg, always"``; acting in contact goes without saying.
+    """Returns an element's parameters in short, ``"mass 0.01 kg, always"``; that it acts in contact is not mentioned.
 
-    ``units`` are by kind and parameter (``damping.damping``); the number of one that is not there is bare.
+    ``units`` are by kind and parameter (``damping.damping``); a parameter without an entry is shown without a unit.
     """
     own = {name: value for name, value in table.items() if name not in ("kind", "acts")}
     kind = table.get("kind")

@@ -17,7 +17,7 @@ Bracket = tuple[float, float]
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The width down to which a bracket is halved: absolute, or relative to its greater end; 0 for floats."""
+    """The width down to which a bracket is halved: absolute, or relative to its greater end; 0: to adjacent floats."""
 
     absolute: float = 0.0
     relative: float = 0.0
@@ -48,7 +48,7 @@ def bisect_many(
     Args:
         holds: from values by member to whether the property holds there; None, or no answer, ends the search of that
             member with the bracket it has.
-        most_rounds: halvings at most; as many as the tolerance takes when None.
+        most_rounds: most halvings; when None, as many as the tolerance takes.
     """
     narrowed = dict(brackets)
     going = dict(brackets)

@@ -1,4 +1,4 @@
-"""Intervals of confidence, at 95 %: of a share, and of a mean."""
+"""Confidence intervals, at 95 %: of a share, and of a mean."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ class Interval(NamedTuple):
 
 
 def share_interval(held: Sequence[bool] | np.ndarray, clusters: Sequence[object] | None = None) -> Interval:
-    """Returns the share of True with its interval by Wilson (1927); NaN of none.
+    """Returns the share of True with its interval by Wilson (1927); NaN if there are no values.
 
-    What is drawn in clusters tells less than as many draws one by one: n is then p (1 - p) over the variance of p
-    between clusters (Kish's effective size), the number drawn at most.
+    Draws in clusters tell less than as many single draws: n is then p (1 - p) over the variance of p between clusters
+    (Kish's effective size), at most the number drawn.
     """
     n = float(len(held))
     if not n:

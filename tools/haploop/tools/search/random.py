@@ -1,4 +1,4 @@
-"""Random search of the least distance: draw points, refine around the best, and look at the neighbours of those.
+"""Random search for the least distance: draw points, refine around the best, and look at the neighbours of those.
 
 Points of one structure (one option of every choice) are drawn and evaluated in groups, so that an evaluation can treat
 them together. All points of a stage are drawn before any is evaluated: they are the same however groups are spread over
@@ -99,9 +99,10 @@ class Effort:
     """Effort of a search: number of draws, of refinements, and their spread.
 
     Attributes:
-        structures, each: so many structures at random, and points of each.
-        rounds, best, groups, children: of refinement: around so many of the best so far, groups of so many points.
-        finalists, neighbours: so many of the best, and points around each of them.
+        structures, each: number of random structures, and of points of each.
+        rounds, best, groups, children: rounds of refinement; in each, around how many of the best so far, how many
+            groups for each of those, and points in a group.
+        finalists, neighbours: number of the best, and of points around each of them.
         far, close: deviation of a number's logarithm in the first and the last round, and among the neighbours.
     """
 
@@ -125,7 +126,7 @@ class Trial(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The trials as they were drawn, the finalist that is best with the mean of its neighbours added, and those."""
+    """The trials as drawn, the finalist that is best with the mean of its neighbours added, and these neighbours."""
 
     trials: list[Trial]
     best: Trial
@@ -148,8 +149,8 @@ def random_search(
 ) -> Found:
     """Searches a space for the point with the least distance.
 
-    Of one structure no more than a third of the best are refined, so that one good structure does not hide others. A
-    point that is good only just there is worth less than one whose neighbours are good, too.
+    No more than a third of the best that are refined may share a structure, so that one good structure does not hide
+    others. A point that is good only in that very place is worth less than one whose neighbours are good, too.
 
     Args:
         evaluate: returns a row for each point of a group; must be importable where processes evaluate.
@@ -190,7 +191,7 @@ def evaluated(
 
 
 def _best(trials: Sequence[Trial], count: int, key: Callable[[Row], Any]) -> list[Trial]:
-    """Returns the best, of one structure no more than a third of them, but one at least."""
+    """Returns the best, no more than a third of them, but at least one, of any one structure."""
     picked: list[Trial] = []
     for trial in sorted(trials, key=lambda one: key(one.row)):
         if sum(other.point.choices == trial.point.choices for other in picked) < max(1, count // 3):
