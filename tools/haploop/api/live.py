@@ -171,7 +171,7 @@ class LiveLoop:
         one meant, causes a ``UserWarning``.
 
         Raises:
-            TypeError: the values are not a mapping by key.
+            TypeError: the values are not a mapping from keys.
         """
         if not isinstance(values, Mapping):
             raise TypeError(SET_SO)
@@ -198,7 +198,7 @@ class LiveLoop:
         self._ask("undo")
 
     def pause(self) -> int:
-        """Pauses the run at the next tick at which it can stop; returns that tick once all before it are done."""
+        """Pauses the run at the next tick possible; returns that tick once all before it are done."""
         return self._when_done(self._ask("pause")["tick"])
 
     def resume(self) -> int:

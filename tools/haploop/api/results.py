@@ -34,7 +34,7 @@ class ComparisonResult(Comparison):
 
     @property
     def most(self) -> dict[str, Any]:
-        """The element that holds most on the loop as described, in the same form, even if not told from the others."""
+        """The element that holds most on the loop as described, in the same form, told from the others or not."""
         return element_data(best(self.loops[0])[0])
 
     @property

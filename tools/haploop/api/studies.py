@@ -41,8 +41,7 @@ def sweep(
         axes: for each key of the scene, an array or list of values, or a table
             ``{"from": 100, "to": 2000, "count": 20}``.
         values: laid over the scene, as in ``load``.
-        out: directory of the table; if it holds this very sweep, unfinished, that is continued. When None, nothing is
-            kept.
+        out: directory of the table; if it already holds this very sweep, that is continued. When None, nothing is kept.
         workers: number of processes; one per core when None.
         plugins: files with elements, walls, estimators or hand forces.
 

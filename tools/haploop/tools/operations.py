@@ -124,7 +124,7 @@ class Bill:
     Attributes:
         whole: of the whole loop.
         effects: of each named effect: what the loop would save without it, by the effect's name.
-        elements: of each dissipation element, likewise.
+        elements: the same of each dissipation element.
         multiplications: of the motion, in all; and saved by leaving out each effect, by name.
     """
 

@@ -44,7 +44,7 @@ def trajectory(scene: Scene) -> Trajectory:
     """Runs a resolved scene of installed elements to its end; nothing is written, and the verdict is the cheap one.
 
     Raises:
-        ElementError: an element raised, or gave something that is no number.
+        ElementError: an element raised, or returned something that is not a number.
         ArithmeticError: friction switched too often for the plant rate.
     """
     scene, time = by_window(scene), Timebase.from_scene(scene)

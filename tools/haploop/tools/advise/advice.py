@@ -262,7 +262,7 @@ def _shown(
 
 
 def _breaking(subject: Subject, loop: Scene, found: Found) -> Scene | None:
-    """Returns the case that breaks first, on the softest wall, from the one that broke up, on which it is not steady.
+    """Returns the case that breaks first, on the softest wall on which it is not steady, from the one that broke on.
 
     If a run calls all of these steady, the scene is of the wall that broke and ends with the stretch in which it was
     seen to break; None if no hand would feel what a run does there.

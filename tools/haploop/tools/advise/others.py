@@ -40,7 +40,7 @@ def hiding(loop: Scene, trial: Trial, alone_N_m: float, least_N_m: float) -> tup
     found: list[Hidden] = []
     for family in (each for each in HIDING if applies(each, loop)):
         choices = [(family, values) for values in halton(box(family, loop, alone_N_m), _POINTS)]
-        # What is held is less than the wall: if a wall this stiff is too stiff, so is any that would hold as much.
+        # What is held is less than the wall: if this wall is too stiff for the loop, so is any that would hold as much.
         points = [values for _, values in bearing(loop, trial, choices, first, least_N_m)]
         held = tried(trial, [Query(loop, family.elements(values), first, rungs) for values in points], _TOLERANCE)
         some = zip(points, held, strict=True)

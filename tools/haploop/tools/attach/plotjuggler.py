@@ -72,7 +72,7 @@ class MessageBatches:
         self._rows.append((channel, values.reshape(-1, values.shape[-1])))
 
     def message(self, channel: int, log_time_ns: int, obj: Event) -> None:
-        """Ignores an event: it is no number."""
+        """Ignores an event: it is not a number."""
 
     def take_messages(self, wanted: bool = True) -> Iterator[tuple[str, bytes]]:
         """Yields the rows since the last call as messages, (topic, msgpack), each topic's in the order of writing.

@@ -61,7 +61,7 @@ def _ask(run_id: Any, as_json: bool, verb: str, **arguments: Any) -> None:
 
 @for_a_run
 def pause(run: Run = None, json: Json = False) -> None:
-    """Pause at the next tick at which the run can stop."""
+    """Pause at the next tick possible."""
     _ask(run, json, "pause")
 
 

@@ -22,7 +22,7 @@ from haploop.tools.executor.executors import Executor
 from haploop.tools.render.progress import Stage
 
 DESCRIBED = "as described"
-# Seeds whose results are told, and those that rankings are checked against: tuning and trial have others.
+# Blocks of seeds whose results are shown, and against which rankings are checked: tuning and trial have others.
 TOLD, AGAIN = 1, 2
 # An element that holds less than this share of what is held without one hides every wall.
 _SHOWS = 0.1
@@ -36,7 +36,7 @@ class OfLoop:
     Attributes:
         delay_s: the round-trip delay.
         alone_N_m: roughly the stiffest wall without any, from which the searches begin.
-        rows: the results under the seeds that are told.
+        rows: the results under the seeds shown.
         again: the results under the others.
     """
 

@@ -21,7 +21,7 @@ _OFF = (DELAY, "device mass", "hand mass", "hand damping", "hand stiffness", "ca
 def draw(of: Ranges, block: int, seed: int, count: int) -> tuple[Case, ...]:
     """Returns ``count`` cases: one hold in each part of the range of holds, all else anywhere between its ends.
 
-    A delay is at either end, since only loops with the same delay run side by side.
+    A delay is at either end, since loops with the same delay run side by side.
 
     Args:
         block: a block of seeds; two blocks share no case.

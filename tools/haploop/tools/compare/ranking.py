@@ -40,7 +40,7 @@ def without(rows: Sequence[Row]) -> Row:
 
 
 class Ranking(NamedTuple):
-    """Pairs of stabilizers that are apart under the seeds that are told, the one that renders more first.
+    """Pairs of stabilizers that are apart under the seeds shown, the one that renders more first.
 
     Attributes:
         told: all of them.

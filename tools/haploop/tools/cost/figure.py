@@ -125,7 +125,7 @@ def _limits(scene: SceneCost, tolerance_m: float) -> tuple[float, float, float]:
 
 
 def drawn_m(point: Point, scene: SceneCost) -> float:
-    """Returns the error of a point as drawn: at least a share of the reference's uncertainty; its upper end if in doubt."""
+    """Returns a point's error as drawn: the upper end if in doubt; at least a share of the reference's uncertainty."""
     size_m = math.inf if point.error is None else point.at_most_m if _in_doubt(point.error) else point.error.size_m
     return max(size_m, _WITHIN * scene.reference.error_m, 1e-18)
 

@@ -130,7 +130,7 @@ Swings = dict[str, float | None]
 
 
 def starts(scene: Scene) -> list[Scene]:
-    """Returns the scene from so many starts, 1 µm apart, the first its own."""
+    """Returns the scene from ``STARTS`` starts, 1 µm apart, the first its own."""
     device = scene.device
     moved = (replace(device, position=device.position + start * _APART_M) for start in range(STARTS))
     return [replace(scene, device=each) for each in moved]

@@ -206,7 +206,7 @@ class Pool:
 
 
 def read_sources(plugins: Iterable[Path]) -> tuple[tuple[str, str], ...]:
-    """Reads plugin files for workers, which have none of their own, as (path, text); PluginError for an unusable one."""
+    """Reads plugin files for workers, which have none of their own, as (path, text); PluginError if one is unusable."""
     for path in plugins:
         load_plugin(path)
     return tuple((str(path), path.read_text(encoding="utf-8")) for path in map(Path, plugins))

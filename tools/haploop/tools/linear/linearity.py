@@ -54,7 +54,7 @@ def why_not_linear(scene: Scene, kinds: Kinds | None = None) -> list[str]:
 def with_spring(scene: Scene) -> Scene:
     """Returns a scene whose wall is a spring, with an element that has its damping: in lasting contact the same loop.
 
-    That a damped spring never pulls is left out; nothing is for small swings around a depth that do not come to that.
+    That a damped spring never pulls is left out; for small swings around a depth that do not come to that, nothing is.
     A wall that is not a spring and damper is kept.
     """
     known = make_wall(scene.wall).stiffness_and_damping()

@@ -38,7 +38,7 @@ class StiffnessLimit:
 
 
 def stiffness_limit(scene: Scene, kinds: dict[str, type[Element]]) -> StiffnessLimit:
-    """The limit of a resolved scene's loop, checked by a run on either side; raises NotLinear, NeverStable without one."""
+    """The limit of a resolved scene's loop, checked by a run on either side; NotLinear, NeverStable without one."""
     limit = OneTickMap.from_scene(scene, kinds).stiffness_limit()
     verdicts = [run_in_process(pressed_deep(scene, share * limit, kinds), kinds)["verdict"] for share in (BELOW, ABOVE)]
     return StiffnessLimit(limit, *verdicts)

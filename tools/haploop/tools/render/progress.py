@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from haploop.protocol.transport.wire import Message
 
-# Names a stage of so many parts; what it returns is called after each of them.
+# From the name of a stage and its number of parts to a function that is called after each part.
 Stage = Callable[[str, int], Callable[[], None]]
 _REFRESH_S = 0.1
 _JUDGING = "Over; held still and pushed, to be judged. Ctrl-C leaves it unjudged."

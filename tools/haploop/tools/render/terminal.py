@@ -1,4 +1,4 @@
-"""The terminal: a console, the colours of verdicts, and tables of one look; tables in Markdown."""
+"""The terminal: a console, the colours of verdicts, and tables of uniform look; tables in Markdown."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def make_table(
 
 
 def make_facts(rows: Iterable[tuple[str, str | Text]], least_width: int | None = None) -> Table:
-    """Makes a grid of names, at least so many letters wide, and values, without lines or heads."""
+    """Makes a grid of names, at least ``least_width`` letters wide, and values, without lines or heads."""
     from rich.table import Table
 
     grid = Table.grid(padding=(0, 2))

@@ -120,8 +120,8 @@ def flipped(of: Ranges, some: Corner) -> list[Corner]:
 def drawn(of: Ranges, corners: int, points: int) -> list[Corner]:
     """Returns this many corners, or all if there are no more, and points within, evenly on logarithmic axes.
 
-    A delay is at either end or as described, since only loops with the same delay run side by side. Each call draws
-    the same.
+    A delay is at either end or as described, since loops with the same delay run side by side. Each call draws the
+    same.
     """
     random, count = np.random.default_rng(1), 2 ** len(of)
     numbers = range(count) if count <= corners else np.unique(random.integers(count, size=corners)).tolist()

@@ -55,7 +55,7 @@ class Loops(BatchLoop):
         self._limit_m, self._tick = scene.diverged_beyond, 0
 
     def go_on(self, ticks: int) -> Seen:
-        """Runs so many ticks more."""
+        """Runs for this many more ticks."""
         x = np.empty((ticks, len(np.atleast_1d(self._motion.x))))
         with np.errstate(all="ignore"):
             for row in range(ticks):
@@ -83,7 +83,7 @@ class LoneLoop:
         self._plant, self._controller = Plant(scene, self._time), Controller(scene, self._time, dict(kinds))
 
     def go_on(self, ticks: int) -> Seen:
-        """Runs so many ticks more."""
+        """Runs for this many more ticks."""
         self._plant.run_until(
             self._plant.tick + ticks, lambda _, samples: [float(force) for force in self._controller.answer(samples)]
         )
