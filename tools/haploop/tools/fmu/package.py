@@ -33,7 +33,7 @@ class NotCompiled(Exception):
 
 
 def make_fmu(scene: Scene, stem: str) -> bytes:
-    """Makes the FMU of a resolved scene's controller; the same scene and ``stem`` of its name give the same bytes.
+    """Makes the FMU of a resolved scene's controller; the same scene and its identifier's ``stem`` give the same bytes.
 
     Raises:
         NotExportable: no FMU can be made of this scene.
