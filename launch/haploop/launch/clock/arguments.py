@@ -1,4 +1,4 @@
-"""Arguments of commands: refused where the command does not take them, or they would hold time up."""
+"""Arguments of commands: refused if the command does not take them, or if they would hold up time."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from haploop.launch.clock.clock import ClockError
 from haploop.launch.scene.units import is_exotic
 from haploop.protocol.transport.wire import Message
 
-# What one command may carry, so that none holds time up: keys and values, tables in each other, letters of a text.
+# What one command may carry, so that none holds up time: keys and values, nested tables, characters of a text.
 _MOST_VALUES, _DEEPEST, _LONGEST = 64, 3, 200
 _UNITS = "Hz, J, N, Pa, W, g, m, min, rad, s and %, with n, u, m, c, k or M before them"
 
 
 def check_names(verb: str, act: Callable[..., Any], arguments: Message) -> None:
-    """Raises ClockError where an argument is none of the command's, or one that it needs is missing."""
+    """Raises ClockError if the command does not take an argument, or if one that it needs is missing."""
     taken = signature(act).parameters
     needed = [name for name, one in taken.items() if one.default is one.empty and name not in arguments]
     if needed or not arguments.keys() <= taken.keys():
@@ -26,7 +26,7 @@ def check_names(verb: str, act: Callable[..., Any], arguments: Message) -> None:
 
 
 def check_burden(arguments: Message) -> None:
-    """Raises ClockError where a command carries more than takes a moment to look through, or keys that are none."""
+    """Raises ClockError if a command carries more than can be checked in a moment, or keys that are not texts."""
     left: list[tuple[Any, int]] = [(arguments, 0)]
     seen = 0
     while left:

@@ -19,24 +19,24 @@ if TYPE_CHECKING:
 
 
 def settable_at(scene: Scene, kinds: Mapping[str, type[Element]]) -> dict[str, Number]:
-    """Returns every key that can be set while this scene is at work, and the number that reads its value."""
+    """Returns every key that can be set while this scene runs, with the number that reads its value."""
     return settable_keys([element.name for element in scene.dissipation], scene.wall and class_of(scene.wall), kinds)
 
 
 def units_at(scene: Scene, kinds: Mapping[str, type[Element]]) -> dict[str, str]:
-    """Returns the units of a scene's settable keys, and by kind and parameter (``damping.damping``)."""
+    """Returns the units of a scene's settable keys, and of every parameter of a kind (``damping.damping``)."""
     declared = {kind: element.parameters().items() for kind, element in kinds.items()}
     of_kinds = {f"{kind}.{name}": quantity.unit for kind, each in declared.items() for name, (quantity, _) in each}
     return of_kinds | {key: number.quantity.unit for key, number in settable_at(scene, kinds).items()}
 
 
 def as_typed(value: object) -> str:
-    """Returns the words of a value as a scene and a command take them."""
+    """Returns a value as it is written in a scene and in a command."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def in_words(scene: Scene, kinds: Mapping[str, type[Element]], values: Mapping[str, Any]) -> dict[str, str]:
-    """Returns values of settable keys, in SI units, with their units; all digits, so that they can be set again."""
+    """Returns values of settable keys in SI units, with their unit and all digits, so that they can be set again."""
     numbers = settable_at(scene, kinds)
     return {
         key: f"{as_typed(value).removesuffix('.0')} {numbers[key].quantity.unit}".strip()
@@ -49,7 +49,7 @@ def capabilities(scene: Scene, kinds: Mapping[str, type[Element]]) -> Message:
 
     Returns:
         ``settable``: key -> unit, bounds and present value; ``kinds``: kind -> what it does and its parameters with
-        unit, bounds and default; ``elements``: those at work. A bound or default that is not there is None.
+        unit, bounds and default; ``elements``: those in use. A missing bound or default is None.
     """
     keys = settable_at(scene, kinds)
     return {

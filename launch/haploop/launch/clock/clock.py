@@ -20,31 +20,31 @@ from haploop.protocol.ticks import HELD_S, Timebase
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-# Grants, ``HELD_S`` apart, that the slowest lossless node has not worked through. Each may end in blocks of its own,
-# however short; with those of the window they must stay below what telemetry keeps for a subscriber.
+# The most grants, ``HELD_S`` apart, that the slowest lossless node has not worked through. Each may end in blocks of
+# its own, however short; with those of the window they must stay below what telemetry keeps for a subscriber.
 MOST_GRANTS = 70
-# Changes that may wait for their tick at a time: every further one is checked against all of them.
+# The most changes that may wait for their tick at a time: each new one is checked against all of them.
 MOST_CHANGES = 100
-# No run goes on for longer, s of simulated time.
+# The longest that a run can last, s of simulated time.
 LATEST_S = 1e9
 
 
 class ClockError(Exception):
-    """A command that cannot be carried out; the message says why and what could be."""
+    """A command that cannot be carried out; the message says why, and what would be possible."""
 
 
 class Clock:
     """Grants time to the nodes of one run.
 
-    A tick may be worked on once it is granted; a change takes effect at a tick not yet granted, so every node knows
+    A tick may be worked on once it is granted; a change takes effect at a tick not yet granted, so every node learns
     of it in time. The grant is the least of: the end, the next pause, the target of a step, the pace, and the
-    progress of the slowest lossless node plus the window; and no more than ``MOST_GRANTS`` lie ahead of that node.
+    progress of the slowest lossless node plus the window. No more than ``MOST_GRANTS`` grants lie ahead of that node.
 
-    ``in_leaps``: of a quarter of the window at least, for a plant that keeps the time: many small grants would come to
-    ``MOST_GRANTS`` long before they come to the window, and a device cannot wait.
+    ``in_leaps``: each grant covers at least a quarter of the window, for a plant that owns the time: many small grants
+    would reach ``MOST_GRANTS`` long before they reach the window, and a device cannot wait.
 
     Attributes:
-        newest: the event of the last change asked for; {} when there was none.
+        newest: the event of the last requested change; {} if there was none.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class Clock:
         Args:
             slowest: tick of the slowest lossless node.
             now: wall time, s.
-            plant: tick of the plant, beyond which a pace grants no more than is made up for at once; None for any.
+            plant: tick of the plant; a pace grants no more beyond it than is made up for at once; None for any.
         """
         limit = min(self.end, slowest + self._window)
         if self._pauses and not self.paused and self.until >= self._pauses[0]:
@@ -112,7 +112,7 @@ class Clock:
         return self.until
 
     def wait_s(self, now: float) -> float | None:
-        """Returns the time in s until the pace lets time go on; None when the run waits for something else."""
+        """Returns the time in s until the pace lets time continue; None if the run waits for something else."""
         return None if self._held or math.isinf(self.pace.rate) else self.pace.wait_s(self.until, now)
 
     @property
@@ -123,7 +123,7 @@ class Clock:
     # Changes
 
     def take_events(self) -> list[tuple[int, Event]]:
-        """Events up to ``until`` that have not been sent, in order; after a stop, what lies behind it never happens."""
+        """Returns the events up to ``until`` that have not been sent, in order; events after a stop never happen."""
         due = self._sent
         while due < len(self.events) and self.events[due][0] <= self.until:
             due += 1
@@ -131,7 +131,7 @@ class Clock:
         return events
 
     def events_from(self, tick: int) -> list[tuple[int, Event]]:
-        """Events from ``tick`` on that have been sent already, for a node that joins late."""
+        """Returns the events from ``tick`` on that have already been sent, for a node that joins late."""
         return [(at, event) for at, event in self.events[: self._sent] if at >= tick]
 
     def _insert(self, tick: int, event: Event) -> None:
@@ -147,8 +147,8 @@ class Clock:
 
         Args:
             change: ``{"swap": {...}, "element": i}`` or ``{"set": {...}}`` as in ``[[event]]``, not yet checked.
-            at_s: when, in simulated seconds; at once when None.
-            extra: what the event carries beside (a plugin to load).
+            at_s: time of the change in simulated seconds; None for at once.
+            extra: what else the event carries (a plugin to load).
 
         Raises:
             SceneError: the change does not fit the run; nothing happens.
@@ -163,7 +163,7 @@ class Clock:
         return tick
 
     def withdraw(self, asked: Event) -> bool:
-        """Takes back what was once ``newest`` as if nobody had asked for it; False where nodes know of it already."""
+        """Takes back an event that was once ``newest`` as if never asked for; False if nodes already know of it."""
         place = next((i for i in range(self._sent, len(self.events)) if self.events[i][1] is asked), None)
         if place is None:
             return False
@@ -182,12 +182,12 @@ class Clock:
         return tick, resolve_event({**change, "at": tick / self._time.control_rate}, self._scene, kinds)
 
     def prepare(self) -> None:
-        """Makes what the check of a first change would make, and a first mistake, while nobody waits for it."""
+        """Does the one-time work of checking a change, and of a mistake in one, while nobody waits for it."""
         with suppress(SceneError):
             resolve_event({"swap": {"kind": ""}, "at": 0.0}, self._scene, self._kinds)
 
     def tick_at(self, at_s: float | None) -> int:
-        """Returns the first tick at or after a time in s, the next for None; raises ClockError where it is no time."""
+        """Returns the first tick at or after a time in s, the next for None; raises ClockError for an invalid time."""
         if at_s is None:
             return self.until
         if isinstance(at_s, bool) or not isinstance(at_s, int | float) or not 0.0 <= at_s <= LATEST_S:
@@ -210,24 +210,24 @@ class Clock:
             )
 
     def note(self, event: Event) -> int:
-        """Puts an event that changes no bit (pause, resume, a refusal) on record at the present tick; returns it."""
+        """Records an event that changes no bit (pause, resume, a refusal) at the present tick; returns that tick."""
         self._insert(self.until, event)
         return self.until
 
     def pause(self) -> int:
-        """Stops time at the first tick not yet granted; returns it."""
+        """Stops time at the first tick not yet granted; returns that tick."""
         self.paused, self._step_target = True, None
         return self.until
 
     def resume(self) -> int:
-        """Lets time go on; returns the tick."""
+        """Lets time continue; returns the tick."""
         self.paused, self._step_target = False, None
-        self._pauses = [tick for tick in self._pauses if tick > self.until]  # stepped over while standing still
+        self._pauses = [tick for tick in self._pauses if tick > self.until]  # others were stepped over in a pause
         self.pace.anew()
         return self.until
 
     def step(self, ticks: int) -> int:
-        """Lets time go on for some ticks; returns the tick at which it will stop."""
+        """Lets time continue for some ticks; returns the tick at which it will stop."""
         self.paused = True
         self._step_target = min(self.end, max(self.until, self._step_target or 0) + ticks)
         self.pace.anew()
@@ -239,12 +239,12 @@ class Clock:
         return self.until
 
     def scene_at(self, tick: int) -> Scene:
-        """Returns the scene as it stands at a tick, all changes up to there made."""
+        """Returns the scene at a tick, with all changes up to there made."""
         unsettled = changes_of(self.events[self._settled :])
         return at_work(self._scene, [change for change in unsettled if change.tick <= tick])
 
     def settle(self, tick: int) -> None:
-        """Takes the changes before ``tick`` as made: all that was refused of them is on record."""
+        """Takes the changes before ``tick`` as made: every refusal among them is on record."""
         end = self._settled
         while end < len(self.events) and self.events[end][0] < tick:
             end += 1
@@ -257,15 +257,15 @@ class Clock:
             self._scene, self._settled = replace(at_work(self._scene, made), event=waiting), end
 
     def present(self) -> Scene:
-        """Returns the scene as it stands at the first tick not yet granted."""
+        """Returns the scene at the first tick not yet granted."""
         return self.scene_at(self.until)
 
     def stop(self) -> int:
-        """Ends the run at the first tick not yet granted; returns it."""
+        """Ends the run at the first tick not yet granted; returns the tick of its end."""
         self.end = min(self.end, self.until)
         self.paused = False
         return self.end
 
     def end_at(self, tick: int) -> None:
-        """Ends the run where the plant has ended it by itself."""
+        """Ends the run at the tick at which the plant itself ended it."""
         self.end = min(self.end, tick)

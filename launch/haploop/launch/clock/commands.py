@@ -48,14 +48,14 @@ def pace_in_words(pace: float) -> float | str:
 class Commands:
     """Carries out COMMAND messages: each a verb and its arguments, answered with a sentence and data.
 
-    Whatever is refused leaves the run as it was.
+    A refused command leaves the run as it was.
     """
 
     def __init__(self, clock: Clock, spec: RunSpec, roster: Callable[[], Roster]) -> None:
         self._clock, self._spec, self._roster, self._reloads = clock, spec, roster, Reloads(clock, spec)
         self._rate = spec.scene.clock.control_rate
         self._is_trying = False
-        # Of each change: its event, the change that would take it back, None where none can, and the code before.
+        # For each change: its event, the change that would take it back (None if none can), and the code before it.
         self._undo_by: list[tuple[Event, Event | None, Code | None]] = []
         self._verbs = {
             "status": self._status,
@@ -71,7 +71,7 @@ class Commands:
         }
 
     def __call__(self, verb: str, arguments: Message) -> Answer | Generator[None, None, Answer]:
-        """Returns the answer, or steps to be gone through one by one while time goes on, which return it."""
+        """Returns the answer, or a generator that returns it, to be advanced step by step while time goes on."""
         act = self._verbs.get(verb)
         if self._spec.clock == device_time.PLANT and (why := device_time.refusal(verb, arguments)):
             return False, why, {}
@@ -165,7 +165,7 @@ class Commands:
     def _swap(
         self, swap: Tables, element: int = 0, at: float | None = None, reload: bool = False
     ) -> Done | Generator[None, None, Done]:
-        """A kind that came from a file is tried first, which takes time: the answer comes later."""
+        """Swaps an element; a kind from a file is tried first, which takes time, so the answer comes later."""
         kind, change = swap.get("kind") if isinstance(swap, dict) else None, {"swap": swap, "element": element}
         if isinstance(kind, str) and kind in self._spec.plugin_sources:
             return self._swap_tried(change, at, reload)
@@ -189,14 +189,14 @@ class Commands:
         return (yield from self._on_probation(self._swapped(change, before, tick, code)))
 
     def _settle(self, withdrawn: Event | None = None) -> None:
-        """Forgets reloads that have failed since, with their code: there is nothing left of them to undo."""
+        """Forgets reloads that have failed since, and their code: nothing is left of them to undo."""
         self._forget(*self._reloads.settle(withdrawn))
 
     def _forget(self, *events: Event) -> None:
         self._undo_by = [each for each in self._undo_by if not any(each[0] is event for event in events)]
 
     def _on_probation(self, done: Done) -> Generator[None, None, Done]:
-        """Returns the answer to a swap to an element that may raise, once it has been at work for a tick."""
+        """Returns the answer to a swap to an element that may raise, once the element has worked for a tick."""
         asked = self._undo_by[-1][0]
         try:
             text, data = yield from when_seen(self._clock, self._roster, *done, by="controller")
@@ -207,10 +207,10 @@ class Commands:
         return f"{text}\n{_PROBATION[self._spec.scene.run.faulty_swap]}", data
 
     def _swapped(self, change: Event, before: Sequence[ElementTable], tick: int, code: Code | None = None) -> Done:
-        """Tells what was done, and what would undo it; ``code`` is that before a reload, which undo brings back."""
+        """Returns what was done and what would undo it; ``code`` is that before a reload, which undo brings back."""
         swap, element = change["swap"], change["element"]
         text, data = f"element {element} becomes {swap['kind']} at {self._at(tick)}", {"tick": tick}
-        if swap["kind"] == NO_ELEMENT and element < len(before) - 1:  # those after it move up: no swap brings it back
+        if swap["kind"] == NO_ELEMENT and element < len(before) - 1:  # those after it move up: no swap restores it
             self._undo_by.append((self._clock.newest, None, None))
             return text, data
         back = before[element].as_dict() if element < len(before) else {"kind": NO_ELEMENT}
@@ -232,14 +232,14 @@ class Commands:
         self._undo_by.append((self._clock.newest, {"set": back}, None))
         known, kinds = notes(before, self._spec.kinds), self._spec.kinds
         found = [note for note in notes(self._clock.scene_at(tick), kinds) if not note.key.startswith("event.")]
-        new = [note for note in found if note not in known]  # who sets a thing anew knows that it was set
+        new = [note for note in found if note not in known]  # whoever sets a key again knows that it was set
         text = f"{what} from {self._at(tick)} on; to go back: set {words}"
         return "\n".join([text, *new]), {"tick": tick, "before": {"set": back}, "notes": new}
 
     def _undo(self) -> tuple[str, Message]:
-        """Takes the last swap or set back: out of the future where it still lies there, else by another change at once.
+        """Undoes the last swap or set: withdraws it if it still lies in the future, else makes another change at once.
 
-        An element comes back with the parameters it had, and begins anew: what it remembered is gone.
+        An element comes back with the parameters it had, but starts afresh: what it remembered is lost.
         """
         if not self._undo_by:
             raise ClockError("There is nothing to undo: no swap and no set that a command asked for is left.")
@@ -255,7 +255,7 @@ class Commands:
             self._settle(withdrawn=asked)
             text, data = f"{what} will not happen", {}
         else:
-            # The file that the kind had before a reload comes back with the element, of whatever kind that is.
+            # The file that the kind had before the reload comes back with the element, of whatever kind that is.
             if code and (former := code[asked["swap"]["kind"]]) and former[2]:
                 tick, _ = self._reloads.change(back, None, code, former[2])
             else:
@@ -266,7 +266,7 @@ class Commands:
 
 
 def _refusal(verb: str, error: Exception) -> Answer:
-    """Returns the answer to what failed: whatever a terminal sends, the run goes on."""
+    """Returns the answer to a command that failed: whatever a terminal sends, the run continues."""
     if isinstance(error, SceneError):
         told = [str(mistake) for mistake in error.mistakes[:_MOST_TOLD]]
         rest = len(error.mistakes) - len(told)

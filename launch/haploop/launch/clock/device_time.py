@@ -1,4 +1,4 @@
-"""A run whose plant owns the time, as a device does: what it needs, what it refuses, and the lateness that it tells."""
+"""A run whose plant owns the time, as a device does: what it needs, what it refuses, and the lateness it reports."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from haploop.protocol.ticks import DELAY
 from haploop.protocol.transport.wire import Message
 
 PLANT = "plant"
-# Commands that would hold a device's time or hurry it.
+# Commands that would halt a device's time or hurry it.
 REFUSED = ("pause", "resume", "step", "pace")
 GOES_ON = "The plant owns the time of this run, which goes on by its own clock; `haploop stop` ends it."
 DELAY_STAYS = "The delay is the time that the answers to a device have; it stays what the run began with."
@@ -19,7 +19,7 @@ _COUNTS = ("ticks", "late_ticks")
 
 
 def check_owner(spec: RunSpec) -> None:
-    """Raises OutputError where the plant of a run is to own the time, but cannot."""
+    """Raises OutputError if the plant of a run is to own the time but cannot."""
     if spec.clock != PLANT:
         return
     if PLANT not in spec.programs:
@@ -36,7 +36,7 @@ def check_owner(spec: RunSpec) -> None:
 
 
 def refusal(verb: str, arguments: Message) -> str:
-    """Returns why a command cannot be carried out while the plant owns the time; "" for one that can."""
+    """Returns why a command cannot be carried out while the plant owns the time; "" if it can."""
     if verb in REFUSED:
         return GOES_ON
     values = arguments.get("set")
@@ -44,7 +44,7 @@ def refusal(verb: str, arguments: Message) -> str:
 
 
 def lateness_told(told: Message) -> dict[str, Any]:
-    """Returns the figures of ``lateness`` that a plant has told, marked by ``clock``; that alone where it told none."""
+    """Returns the ``lateness`` figures that a plant reported, marked by ``clock``; only the mark if there are none."""
     late = told.get("lateness")
     if not isinstance(late, dict):
         return {"clock": PLANT}

@@ -1,4 +1,4 @@
-"""The rules by which a JOIN is let in."""
+"""The rules by which a JOIN is accepted."""
 
 from __future__ import annotations
 
@@ -13,18 +13,19 @@ _PROGRAM_KEYS, _LONGEST_TEXT = ("name", "version", "command"), 200
 
 
 def what_joins(request: Message) -> dict[str, Any]:
-    """Returns name, version and command of what asks to join, as far as it tells them."""
+    """Returns name, version and command of the program that asks to join, as far as it states them."""
     told = request["program"] or {}
     return {key: told[key] for key in _PROGRAM_KEYS if key in told}
 
 
 def why_refused(request: Message, program: Message, secret: str, roster: Roster, has_begun: bool) -> str:
-    """Returns why a JOIN is not let in, a sentence; "" where it is.
+    """Returns why a JOIN is refused, a sentence; "" if it is accepted.
 
     Args:
-        request: the fields of the JOIN by name; ``program``: of them what tells people what joins.
-        secret: of the run, known to its own processes and the programs in their places.
-        has_begun: whether all of these have joined.
+        request: the fields of the JOIN by name.
+        program: name, version and command in it, which tell people what joins.
+        secret: the secret of the run, known to its own processes and the programs in their places.
+        has_begun: whether all of these processes and programs have joined.
     """
     role, endpoints = request["role"], request["endpoints"]
     binds = PROCESSES[role].binds if role in PROCESSES else None

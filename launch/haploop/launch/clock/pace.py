@@ -8,15 +8,15 @@ from typing import Any
 
 # Simulated seconds per wall second that may be asked for.
 SLOWEST, FASTEST = 1e-6, 1e6
-# Grants are at least so far apart, s of wall time: up to 2 ticks a ms go one by one, faster ones in blocks.
+# Grants are at least this far apart, s of wall time: up to 2 ticks a ms are granted one by one, faster ones in blocks.
 LEAST_GRANT_S = 0.0005
-# Ticks held up for no longer than this are made up for at once, s of wall time; the rest of the time is lost.
+# A hold-up of the ticks by up to this, s of wall time, is made up for at once; the rest of the time is lost.
 CATCH_UP_S = 0.02
-# A tick counts as late that is done later than this after it was due, or than a period where that is longer.
+# A tick counts as late if it is done later than this, s, after it was due, or than a period if that is longer.
 _LATE_S = 0.001
 # Lateness is counted in classes, each wider than the one before by this factor.
 _FINEST_S, _FACTOR = 1e-6, 1.05
-# The entries of ``lateness`` of a run at a pace, or of one whose plant owns the time; absent where there was neither.
+# The entries of ``lateness`` of a run at a pace, or of one whose plant owns the time; absent for any other run.
 LATENESS = {
     "ticks": "ticks whose lateness is known: at a pace, how long after it was due a tick was done; where the plant "
     "owns the time, how long after its sample was due an answer came",
@@ -32,11 +32,11 @@ LATENESS = {
 
 
 class PaceError(ValueError):
-    """Raised for a pace that cannot be kept; the message says which can."""
+    """A pace that cannot be kept; the message says which paces can."""
 
 
 def pace_of(pace: object) -> float:
-    """Returns a pace that was asked for, infinite for ``free``; raises PaceError where it is none."""
+    """Returns the requested pace, infinite for ``free``; raises PaceError if it is not a pace."""
     if pace == "free":
         return math.inf
     if isinstance(pace, bool) or not isinstance(pace, int | float) or not SLOWEST <= pace <= FASTEST:
@@ -48,8 +48,8 @@ def pace_of(pace: object) -> float:
 class Pace:
     """Says which ticks are due, and keeps count of how late they are done.
 
-    Tick k is due (k - first tick) / (control rate * pace) after the first. Whoever was held up for longer than
-    ``CATCH_UP_S`` makes up for that much; all further ticks are due later by the rest, which is lost.
+    Tick k is due (k - first tick) / (control rate * pace) after the first. A run held up for longer than
+    ``CATCH_UP_S`` makes up for that much; all further ticks become due later by the rest, which is lost.
 
     Attributes:
         rate: simulated seconds per wall second; infinite: every tick is due at once.
@@ -65,7 +65,7 @@ class Pace:
         self.set(rate)
 
     def set(self, rate: float) -> None:
-        """Takes another rate, infinite for none; PaceError where it cannot be kept."""
+        """Sets another rate, infinite for no pace; raises PaceError if it cannot be kept."""
         self.rate = rate if rate == math.inf else pace_of(rate)
         self._period_s = 1.0 / (rate * self._control_rate)
         self._late_s = max(_LATE_S, self._period_s)
@@ -77,7 +77,7 @@ class Pace:
         return 1 if math.isinf(self.rate) else max(1, math.floor(seconds / self._period_s))
 
     def anew(self) -> None:
-        """Begins the schedule with the next tick asked for; time spent standing still is not made up for."""
+        """Restarts the schedule with the next tick asked for; time spent standing still is not made up for."""
         self._from: tuple[float, int] | None = None
 
     def _due(self, tick: int, now: float) -> float:
@@ -85,12 +85,12 @@ class Pace:
         return began + (tick - first) * self._period_s
 
     def allowed(self, until: int, now: float) -> int:
-        """Returns the tick up to which all are due at wall time ``now`` (s); ``until`` while a grant comes too soon."""
+        """Returns the tick up to which all are due at wall time ``now``, s; ``until`` if that is too early to grant."""
         behind = math.floor((now - self._due(until, now)) / self._period_s + 1e-6) + 1
         return until + behind if behind >= self._least else until
 
     def grant(self, until: int, limit: int, now: float) -> int:
-        """Notes that the ticks from ``until`` on are granted as far as they are due and ``limit`` lets them.
+        """Grants, and notes, the ticks from ``until`` on as far as they are due and ``limit`` allows.
 
         Returns the tick up to which they are granted.
         """
@@ -123,7 +123,7 @@ class Pace:
                 self._awaited.appendleft((tick, end, due + (tick - first) * period_s, period_s))
 
     def lateness(self) -> dict[str, Any]:
-        """Returns how late the ticks were done, by keys of ``LATENESS``; {} where none was to keep a pace."""
+        """Returns how late the ticks were done, by keys of ``LATENESS``; {} if none had a pace to keep."""
         ticks = self._late.total()
         if not ticks:
             return {}

@@ -1,4 +1,4 @@
-"""A swap to an element of a plugin: its file is tried in a process of its own first, and only then taken up."""
+"""A swap to an element of a plugin: the file is first tried in a separate process, and only then used."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 def swap_plugin(
     clock: Clock, spec: RunSpec, reloads: Reloads, change: Event, at_s: float | None, reload: bool
 ) -> Generator[None, None, tuple[int, Sequence[ElementTable], Code | None]]:
-    """Schedules the swap once its element has been made and has given a force at rest, elsewhere.
+    """Schedules the swap once its element has been made, and has given a force at rest, in another process.
 
-    Returns the tick and the elements before it, and after a reload what the code of its kinds was.
+    Returns the tick, the elements before the swap and, after a reload, the former code of its kinds.
 
-    Yields while the trial goes on, so that time does. Whatever becomes of the trial, this process has not run the file;
-    where anything fails, nothing has changed.
+    Yields during the trial, so that time goes on. Whatever the outcome of the trial, this process has not run the file;
+    if anything fails, nothing has changed.
 
     Args:
         change: ``{"swap": {...}, "element": i}``, of a kind that came from a file.
-        reload: whether to take up the user's file as it is now, instead of the copy at work.
+        reload: whether to use the user's file as it is now, instead of the copy in use.
 
     Raises:
         PluginError, ElementError: the file does not load, or the element does not take its parameters.

@@ -1,4 +1,4 @@
-"""Trying a plugin in a process of its own: whatever it does to that process, here it is a sentence.
+"""Trial of a plugin in a separate process: whatever it does to that process, here it is a sentence.
 
 This process never runs the file. What it needs of it, the declared parameters, it gets as a stand-in for each element.
 """
@@ -24,7 +24,7 @@ from haploop.launch.one_thread import ask_for_one_thread
 from haploop.protocol.quantity import Quantity
 from haploop.protocol.scene.scene import ElementTable
 
-# For each of loading the file and making its elements: what a large library may take to import on a busy machine.
+# Limit for loading the file, and for making its elements: what a large library may take to import on a busy machine.
 LIMIT_S = 10.0
 _LARGEST = 1 << 20
 _LOOK_S = 0.05
@@ -40,7 +40,7 @@ class StandIn(Element):
 
 
 def read_source(path: Path) -> str:
-    """Returns the text of a plugin file; raises PluginError where it is no file, too large, or no text."""
+    """Returns the text of a plugin file; raises PluginError if it is not a file, too large, or not text."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode) or status.st_size > _LARGEST:
@@ -54,12 +54,12 @@ def read_source(path: Path) -> str:
 
 
 class PluginTrial:
-    """One plugin in a process of its own, which ends with this object, a context manager.
+    """A plugin in a separate process, which ends with this object, a context manager.
 
-    ``load`` and ``make`` are generators, so that a clock can go on meanwhile: they yield while the answer is not there.
+    ``load`` and ``make`` are generators, so that a clock can go on meanwhile: they yield until the answer is there.
 
     Attributes:
-        brings: whether the file has walls, estimators or hand forces, too; known once it was loaded.
+        brings: whether the file also has walls, estimators or hand forces; known once it is loaded.
     """
 
     brings = False
@@ -85,7 +85,7 @@ class PluginTrial:
     def load(self) -> Generator[None, None, Kinds]:
         """Loads the file; returns a stand-in for each element, by kind.
 
-        Raises PluginError where it does not load, ends its process, or does not come to an end within the limit.
+        Raises PluginError if it does not load, ends its process, or does not finish within the limit.
         """
         when = "as it loaded"
         reply = yield from self._ask({"source": self._source, "origin": self._origin}, when, PluginError)
@@ -96,7 +96,7 @@ class PluginTrial:
             raise PluginError(self._forged(when)) from None
 
     def make(self, elements: Iterable[ElementTable]) -> Steps:
-        """Makes elements of resolved tables and has each give a force at rest; raises ElementError as ``load`` does."""
+        """Makes elements from resolved tables and a force at rest from each; raises ElementError as ``load`` does."""
         asked = [[element.name, dict(element.parameters)] for element in elements]
         names = " and ".join(f"the element {name}" for name, _ in asked)
         if asked:
@@ -137,7 +137,7 @@ class PluginTrial:
         return f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit status {code}"
 
     def wait(self, steps: Generator[None, None, Any]) -> Any:
-        """Goes through steps of this trial with nothing else to do; returns what they return."""
+        """Runs steps of this trial to their end, with nothing else to do; returns what they return."""
         while True:
             try:
                 next(steps)
@@ -149,7 +149,7 @@ class PluginTrial:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Ends the process and what it has started, unless that has left its group."""
+        """Ends the process and those it has started, unless they have left its group."""
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.kill()

@@ -1,4 +1,4 @@
-"""The file that each kind of element is at work from: of the run's start, or of reloads since that have not failed."""
+"""The file that each kind of element comes from: that of the run's start, or of a later reload that has not failed."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
     from haploop.launch.spec import RunSpec
 
-# Of each kind: its class, the user's file and the run's copy of it, None where it came from no file; None for no kind.
+# For each kind: its class, the user's file and the run's copy of it (None if it came from no file); None if there is no
+# such kind.
 Code = dict[str, "tuple[type[Element], Path | None, Path | None] | None"]
 
 
 class Reloads:
-    """Keeps ``kinds``, ``plugin_sources`` and ``plugin_files`` of a run what its controller has.
+    """Keeps ``kinds``, ``plugin_sources`` and ``plugin_files`` of a run as the controller has them.
 
-    A change that comes with a file makes its code that of its kinds, until the change is refused or taken back: then
-    the last good code is theirs again.
+    When a change comes with a file, its kinds use the code of that file until the change is refused or taken back; then
+    they use the last good code again.
     """
 
     def __init__(self, clock: Clock, spec: RunSpec) -> None:
@@ -35,9 +36,9 @@ class Reloads:
         return spec.kinds[kind], spec.plugin_sources.get(kind), spec.plugin_files.get(kind)
 
     def change(self, change: Event, at_s: float | None, code: Code, file: Path) -> tuple[int, Code]:
-        """Schedules a change that comes with a file; returns its tick, and what its kinds were before.
+        """Schedules a change that comes with a file; returns its tick, and the former code of its kinds.
 
-        Raises what ``Clock.change`` does; nothing has changed then.
+        Raises what ``Clock.change`` raises; then nothing has changed.
         """
         before = {kind: self._now(kind) for kind in code}
         self._write(code)
@@ -50,7 +51,7 @@ class Reloads:
         return tick, before
 
     def settle(self, withdrawn: Event | None = None) -> list[Event]:
-        """Takes the code of changes back that were refused, taken back or withdrawn since; returns those changes."""
+        """Takes back the code of changes refused, taken back or withdrawn since; returns those changes."""
         gone = [event for tick, event, _ in self._made if event is withdrawn or is_off(tick, event, self._clock.events)]
         if gone:
             unknown: Code = {kind: None for *_, code in self._made for kind in code}

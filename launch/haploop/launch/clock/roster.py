@@ -14,14 +14,14 @@ from haploop.protocol.transport.wire import Message
 
 @dataclass
 class Node:
-    """A node as the clock knows it.
+    """The clock's record of a node.
 
     Attributes:
-        role, pid, lossless: as it said when it joined; a lossless node holds the clock back.
-        tick: every tick before it is done.
-        joined, heard, moved: wall time of its JOIN, of its last message, and of its last that told of more ticks, s.
-        is_gone: whether a message could not be sent to it, since its connection has ended.
-        program: name, version and command of what it is, as it said; each a text that may be missing.
+        role, pid, lossless: as stated when it joined; a lossless node holds the clock back.
+        tick: every tick before this one is done.
+        joined, heard, moved: wall time of its JOIN, of its last message, and of the last that reported more ticks, s.
+        is_gone: whether a message could not be sent to it because its connection has ended.
+        program: name, version and command of its program, as it stated them; each a text that may be missing.
     """
 
     identity: bytes
@@ -42,7 +42,7 @@ class Node:
         self.joined = self.moved = self.heard
 
     def reached(self, tick: int) -> None:
-        """Takes note that it has done every tick before this one."""
+        """Records that the node has completed every tick before this one."""
         if tick > self.tick:
             self.tick, self.moved = tick, self.heard
 
@@ -56,10 +56,11 @@ class Roster:
     """The nodes of a run by their identity on the clock's socket.
 
     Args:
-        programs: programs of others that take the place of the run's own processes, by role.
+        programs: foreign programs that take the place of the run's own processes, by role.
 
     Attributes:
-        refused: role -> why the last that asked to join as one was not let in; others than the run's are observers.
+        refused: role -> why the last node that asked to join in this role of the run was refused; any other role is an
+            observer's.
     """
 
     def __init__(self, programs: Mapping[str, Program] = NO_PROGRAMS) -> None:
@@ -72,16 +73,16 @@ class Roster:
         return next((node for node in self.nodes.values() if node.role == role), None)
 
     def label(self, role: str) -> str:
-        """Returns how people are told of a role: by its program, too, where that is somebody else's."""
+        """Returns the name of a role for messages; includes the program's name if it is a foreign program."""
         return self._programs[role].label if role in self._programs else role
 
     @property
     def witness(self) -> str:
-        """The role whose progress tells that changes were made; the logger sees what others make of them."""
+        """The role whose progress shows that changes were made; the logger sees what foreign programs make of them."""
         return "logger" if self._programs else "controller"
 
     def others_than(self, role: str) -> str:
-        """Returns a sentence that names the programs of somebody else's in other roles; "" for none."""
+        """Returns a sentence that names the foreign programs in other roles; "" if there are none."""
         labels = [program.label for program in self._programs.values() if program.role != role]
         return f" With it ran the {' and the '.join(labels)}, not haploop's own." if labels else ""
 
@@ -90,7 +91,7 @@ class Roster:
         return role in self._programs and self._programs[role].is_external
 
     def provenance(self) -> dict[str, Message]:
-        """Returns what plant and controller are, by role, where one of them is not haploop's own; else nothing.
+        """Returns which programs plant and controller are, by role, if one of them is not haploop's own; else nothing.
 
         Each has ``name``, ``version`` and ``command``, "" where unknown, and ``own``: whether it is haploop's.
         """
@@ -109,7 +110,7 @@ class Roster:
         return found
 
     def with_provenance(self, context: Message) -> Message:
-        """Returns the context of WELCOME with what plant and controller are, for the log, too, unless both are own."""
+        """Returns the context of WELCOME extended by ``provenance``, for the log too; unchanged if both are own."""
         programs = self.provenance()
         if not programs:
             return context
@@ -127,7 +128,7 @@ class Roster:
         return {node.role: node.endpoints for node in self.nodes.values() if node.is_own}
 
     def slowest(self) -> int:
-        """The tick of the slowest lossless node but plant and controller; it bounds what is in flight."""
+        """Returns the tick of the slowest lossless node except plant and controller; it bounds what is in flight."""
         return min((node.tick for node in self.nodes.values() if node.lossless and not node.done), default=0)
 
     def followers(self) -> list[Node]:
@@ -137,7 +138,7 @@ class Roster:
     def loop_tick(self) -> int | None:
         """Returns the tick up to which a pace takes the loop as done: the plant's; None before it has joined.
 
-        One of somebody else's may report by the block, long after the controller has answered its samples.
+        A foreign plant may report in blocks, long after the controller has answered its samples.
         """
         plant, controller = self.own("plant"), self.own("controller")
         if plant and controller and "plant" in self._programs:
@@ -149,21 +150,21 @@ class Roster:
         return min((node.tick for node in self.nodes.values() if node.is_own), default=0)
 
     def silent(self, now: float, deadline_s: float) -> list[Node]:
-        """Nodes not heard of for longer than the deadline, the longest silent first."""
+        """Returns the nodes that have been silent for longer than the deadline, the longest silent first."""
         silent = [node for node in self.nodes.values() if not node.done and now - node.heard > deadline_s]
         return sorted(silent, key=lambda node: node.heard)
 
     def discount_silence(self, seconds: float) -> None:
-        """Leaves some time out of the silence of every node."""
+        """Excludes some time, s, from the silence of every node."""
         for node in self.nodes.values():
             node.heard += seconds
             node.joined += seconds
             node.moved += seconds
 
     def table(self) -> list[Message]:
-        """Returns role, pid, tick, lag behind the first, whom it waits for and skipped ticks of every node.
+        """Returns role, pid, tick, lag behind the foremost, whom it waits for and skipped ticks of every node.
 
-        One that is no program of haploop's has its ``program`` beside, as in ``provenance``.
+        A foreign program also has its ``program``, as in ``provenance``.
         """
         programs = self.provenance()
         first = max((node.tick for node in self.nodes.values()), default=0)

@@ -1,4 +1,4 @@
-"""The answer to a change that somebody else's program or element is asked for: given when it is seen, or refused."""
+"""The answer to a change that a foreign program or element is to make: given once it is seen or refused."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from haploop.launch.clock.roster import Roster
 from haploop.protocol.changes import changes_of
 from haploop.protocol.transport.wire import Message
 
-# Of the 5 s for which a terminal waits for its answer.
+# Part of the 5 s for which a terminal waits for its answer.
 _PATIENCE_S = 3.0
 _NOT_YET = {
     "logger": "; not all of this loop is haploop's own, and whether it carries this out is seen when the tick is done",
@@ -23,12 +23,12 @@ def when_seen(
 ) -> Generator[None, None, tuple[str, Message]]:
     """Returns a command's answer once its change has been seen in telemetry, or carried out by the controller.
 
-    It yields while time goes on, and says so in the answer where time does not get there soon.
+    Yields while time goes on; if time does not reach the change soon, the answer says so.
 
     Args:
-        by: whose tick tells: ``logger`` or ``controller``.
+        by: the role whose tick shows it: ``logger`` or ``controller``.
 
-    Raises ClockError where the change was refused.
+    Raises ClockError if the change was refused.
     """
     tick, give_up = data["tick"], time.monotonic() + _PATIENCE_S
     while tick <= clock.until and not clock.paused and time.monotonic() < give_up:

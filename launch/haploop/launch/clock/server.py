@@ -23,11 +23,11 @@ from haploop.protocol.transport.wire import Frame, Message, WireError, decode, e
 Answer = tuple[bool, str, Message]
 Command = Callable[[str, Message], Answer | Generator[None, None, Answer]]
 
-# Messages taken before grants go out, so that nobody who floods the clock can hold time up.
+# The most messages taken before grants go out, so that nobody can hold up time by flooding the clock.
 _AT_ONCE = 200
-# A frame of anybody but the run's own processes, bytes: what is larger takes ms to read.
+# The largest frame taken from anybody but the run's own processes, bytes: a larger one takes ms to read.
 _LARGEST_OF_STRANGERS = 32 * 1024
-# Whoever holds nothing up is told no more often than this how far the others may go.
+# A node that holds nothing up is told no more often than this, s, how far the others may go.
 _TOLD_S = 0.02
 
 
@@ -35,11 +35,11 @@ class ClockServer:
     """Speaks the clock's part of the protocol.
 
     Args:
-        welcome: of the fields of WELCOME run, scene, timebase and context.
+        welcome: the fields run, scene, timebase and context of WELCOME.
         start_gate: given the pids of all that are ready, returns whether the first tick may be worked on.
 
     Attributes:
-        untold: sentences of changes refused or taken back, which whoever leads the run shows and takes out.
+        untold: sentences on changes refused or taken back, which the leader of the run shows and removes.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class ClockServer:
         self.results: dict[str, Message] = {}
         self.unknown_peers = 0
         self.untold: list[str] = []
-        self._sender = b""  # of a message of which frames are still to be taken
+        self._sender = b""  # of a message with frames still to be taken
         self._greeted, self._start_gate = False, start_gate
         self._granted, self._last_sent, self._told_due = -1, False, 0.0
         self._awaited: list[tuple[bytes, Generator[None, None, Answer]]] = []
@@ -72,7 +72,7 @@ class ClockServer:
         return self._clock.is_last
 
     def close(self) -> None:
-        """Stops listening; what was sent still goes out, and what is still being tried for an answer is given up."""
+        """Stops listening; messages already sent still go out, and answers still being worked out are given up."""
         for _, steps in self._awaited:
             steps.close()
         self.socket.close(linger=200)
@@ -80,7 +80,7 @@ class ClockServer:
     def serve(self) -> None:
         """Takes the messages that are there, up to a limit, then grants what can be granted.
 
-        Raises RunFailed where one of the run's own processes said that it cannot go on.
+        Raises RunFailed if one of the run's own processes said that it cannot go on.
         """
         for _ in range(_AT_ONCE):
             if not has_message(self.socket) or not self._take_one():
@@ -99,7 +99,7 @@ class ClockServer:
                 self.grant()
 
     def _take_one(self) -> bool:
-        """Takes a message, or some frames of one with very many; tells whether that was a moment, and no command."""
+        """Takes a message, or some frames of one with very many; tells whether that was quick and no command."""
         sender = self._sender or self.socket.recv()
         data, frames = b"", 0
         while self.socket.rcvmore:
@@ -120,9 +120,9 @@ class ClockServer:
         return frame.name != "COMMAND"
 
     def grant(self) -> None:
-        """Sends every node how far it may go and what changes on the way, if that is news.
+        """Tells every node how far it may go and what changes on the way, if that is new.
 
-        One that holds nothing up gets only some of the grants that change nothing else.
+        A node that holds nothing up gets only some of the grants that bring nothing else new.
         """
         clock, now = self._clock, self._machine.now()
         until = clock.grant(self.roster.slowest(), now, self.roster.loop_tick())
@@ -157,7 +157,7 @@ class ClockServer:
                 node.is_gone = error.errno == zmq.EHOSTUNREACH
 
     def _reply(self, sender: bytes, answer: Answer | Generator[None, None, Answer]) -> None:
-        """Sends an answer, or goes one step further towards it."""
+        """Sends an answer, or takes one more step towards it."""
         if not isinstance(answer, tuple):
             try:
                 next(answer)
@@ -265,12 +265,12 @@ class ClockServer:
         del self.roster.nodes[node.identity]
 
     def drop(self, node: Node, reason: str) -> None:
-        """Takes an attached node off and tells it why."""
+        """Removes an attached node and tells it why."""
         self._send(node.identity, "ABORT", reason)
         self.roster.nodes.pop(node.identity, None)
 
     def abort(self, reason: str, but: Node | None = None) -> None:
-        """Tells every node, but one perhaps, to save what it has and leave."""
+        """Tells every node, except perhaps one, to save what it has and leave."""
         for node in list(self.roster.nodes.values()):
             if not node.done and node is not but:
                 self._send(node.identity, "ABORT", reason)

@@ -18,18 +18,18 @@ _LOOK_MS = 100
 
 
 class Awaited:
-    """The programs of some roles, which join by a file in the run's directory of sockets."""
+    """The external programs of some roles, which join by means of a file in the run's directory of sockets."""
 
     def __init__(self, sockets: Path, programs: Sequence[Program], server: ClockServer, machine: Machine) -> None:
         self._roles = [program.role for program in programs]
         self._sockets, self._server, self._machine = sockets, server, machine
 
     def wait(self, told_to: Callable[[str], Message], wait_s: float, interrupts: Sequence[int]) -> None:
-        """Waits until all have joined; a line on stderr says for whom, and the files go when they have.
+        """Waits until all have joined, then removes the files; a line on stderr says whom the run waits for.
 
         Args:
-            told_to: what the program of a role is told at its start.
-            interrupts: signals that have come.
+            told_to: returns what the program of a role is told at its start.
+            interrupts: signals that have arrived.
 
         Raises:
             NeverBegan: one did not join in time, or the run was stopped.
@@ -54,7 +54,7 @@ class Awaited:
             (self._sockets / seat_file(role)).unlink(missing_ok=True)
 
     def _write(self, role: str, start: Message) -> Path:
-        """Writes what the program of a role is told, for this user's eyes alone; returns the file."""
+        """Writes what the program of a role is told into a file that only this user can read; returns the file."""
         file = self._sockets / seat_file(role)
         told = {"role": role, "run": self._sockets.name, "directory": str(self._sockets), "cores": None, **start}
         with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as opened:

@@ -19,10 +19,10 @@ from haploop.launch.spec import OutputError
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.wire import Message
 
-# What a program of somebody else's is given after the end of its stdin to bring its device to rest.
+# Time, s, that a foreign program is given after the end of its stdin to bring its device to rest.
 _TO_REST_S = 0.1
 MARK = "HAPLOOP_SEAT"
-# What the search for processes that have left the group may take.
+# Time, s, that the search for processes that have left the group may take.
 _GUARD_S = 5.0
 _GUARD = 'read now || sleep {0}; kill -9 $(grep -lsz "{1}" /proc/[0-9]*/environ | tr -dc "0-9\\n"); kill -9 0'
 _NAMED = {int(number) for number in signal.Signals}
@@ -31,11 +31,11 @@ _NAMED = {int(number) for number in signal.Signals}
 class Child:
     """One node's process.
 
-    Its stdin is a line of life: it ends at once when the launcher is gone. What it prints before it keeps its prints in
-    their file goes to the launcher's stderr, never to its stdout.
+    Its stdin is a lifeline: the process ends at once when the launcher is gone. What it prints before it redirects its
+    prints to their file goes to the launcher's stderr, never to its stdout.
 
-    A program of somebody else's writes what it prints to the file of prints from the start, and ends with all that it
-    has started. One of the run's own may have been started ``early``.
+    A foreign program writes its prints to that file from the start, and ends together with all processes that it has
+    started. One of the run's own processes may have been started ``early``.
 
     Attributes:
         died: a file descriptor that becomes readable, without polling, when the process has ended.
@@ -90,15 +90,15 @@ class Child:
         return code is not None and code >= 0
 
     def rouse(self) -> None:
-        """Has a controller that hangs in an element's code give that up, and say where it was."""
+        """Makes a controller that hangs in an element's code give that up and say where it was."""
         self._process.send_signal(signal.SIGUSR1)
 
     def show_stack(self) -> None:
-        """Has a controller that no ``rouse`` could reach, in compiled code, show where it is."""
+        """Makes a controller in compiled code, which ``rouse`` cannot reach, show where it is."""
         self._process.send_signal(signal.SIGUSR2)
 
     def let_go(self) -> None:
-        """Lets a process end that has said DONE; one of somebody else's ends by itself."""
+        """Lets a process that has said DONE end; a foreign program ends by itself."""
         if self._process.stdin and not self._group:
             with contextlib.suppress(OSError):
                 self._process.stdin.write(b"\n")
@@ -113,11 +113,11 @@ class Child:
         return True
 
     def kill(self) -> None:
-        """Ends the process, stopped or not, and reaps it; again, it does nothing more.
+        """Ends the process, stopped or not, and reaps it; a second call does nothing.
 
-        One of the run's own ends now, a program of somebody else's 0.1 s after the end of its stdin.
+        One of the run's own ends now, a foreign program 0.1 s after the end of its stdin.
         """
-        if self.died < 0:  # by now another owner may have the number of the descriptor, as one of ZeroMQ's connections
+        if self.died < 0:  # its descriptor's number may have another owner by now, such as a ZeroMQ connection
             return
         if self._process.stdin:
             with contextlib.suppress(OSError):
@@ -134,16 +134,17 @@ class Child:
 
 
 class _Group:
-    """A process group for a program of somebody else's: all of it ends with the launcher, whatever it does itself.
+    """A process group for a foreign program: all of it ends with the launcher, whatever the program does.
 
-    Its first process waits for a word on its stdin, which the launcher holds open, or 0.1 s beyond the end of it, and
-    kills the group; and, where there is /proc, what has left the group but kept a mark in its environment.
+    The first process of the group waits for a word on its stdin, which the launcher holds open, or until 0.1 s after
+    the end of stdin. It then kills the group and, where there is /proc, also the processes that have left the group but
+    kept a mark in their environment.
 
     Args:
-        environment: of the program; the mark is put there.
+        environment: environment of the program; the mark is added to it.
 
     Attributes:
-        id: of the group, which no other can have before ``kill``.
+        id: number of the group, which no other group can have before ``kill``.
     """
 
     def __init__(self, environment: dict[str, str]) -> None:
@@ -159,7 +160,7 @@ class _Group:
             if self._guard.poll() is None:
                 self._guard.communicate(b"now\n", timeout=_GUARD_S)
                 return
-        with contextlib.suppress(ProcessLookupError):  # the program has killed it, or it is held up
+        with contextlib.suppress(ProcessLookupError):  # the program has killed the guard, or the guard is held up
             os.killpg(self.id, signal.SIGKILL)
         self._guard.communicate()
 
@@ -172,18 +173,18 @@ def start_children(
     programs: Mapping[str, Program],
     early: MutableMapping[str, Started] | None = None,
 ) -> dict[str, Child]:
-    """Starts every process of the table but those that somebody else starts.
+    """Starts every process of the table except those that somebody else starts.
 
     Args:
-        start: what the process of a role is told at its start.
-        programs: programs that take the place of the table's, by role.
-        early: processes that wait to be told, by role; they are taken out.
+        start: returns what the process of a role is told at its start.
+        programs: foreign programs that take the place of the table's, by role.
+        early: processes already started that wait to be told, by role; those used are removed.
 
-    Plant and controller wait for each other at every tick and gain nothing from two cores, but lose the wake-up from
-    one to the other: they share a core, the others get the rest. Runs beside each other take different cores. A process
-    goes to its cores when it has imported what it needs, which all of them do beside each other.
+    Plant and controller wait for each other at every tick: two cores would gain nothing and cost the wake-up from one
+    to the other. They therefore share a core, and the others get the rest. Concurrent runs take different cores. A
+    process moves to its cores when it has imported what it needs; all of them import in parallel.
 
-    Raises OutputError where one cannot be started; none is left then.
+    Raises OutputError if one cannot be started; then none is left.
     """
     loop_cores, other_cores = share_cores(run_number) if pin else (None, None)
     children: dict[str, Child] = {}
@@ -215,9 +216,10 @@ def share_cores(run_number: int) -> tuple[list[int] | None, list[int] | None]:
 
 @contextlib.contextmanager
 def interrupts(usual_from: int, patience_s: float = 0.0) -> Iterator[list[int]]:
-    """Collects SIGINT and SIGTERM in a list; from number ``usual_from`` on, from 1, they raise KeyboardInterrupt.
+    """Collects SIGINT and SIGTERM in a list; from the one with number ``usual_from``, counted from 1, on they raise
+    KeyboardInterrupt.
 
-    So does SIGALRM, which comes ``patience_s`` after the first, if any, unless ``heeded`` is called before.
+    So does SIGALRM, which comes ``patience_s`` after the first, if that is not 0, unless ``heeded`` is called before.
     """
     received: list[int] = []
 
@@ -229,7 +231,7 @@ def interrupts(usual_from: int, patience_s: float = 0.0) -> Iterator[list[int]]:
 
     try:
         before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)}
-    except ValueError:  # not in the main thread: signals are somebody else's business
+    except ValueError:  # not in the main thread: signals are handled elsewhere
         yield received
         return
     try:
@@ -241,5 +243,5 @@ def interrupts(usual_from: int, patience_s: float = 0.0) -> Iterator[list[int]]:
 
 
 def heeded() -> None:
-    """Takes back the SIGALRM of ``interrupts``: the signal before it was heeded."""
+    """Cancels the SIGALRM of ``interrupts``: the signal before it has been heeded."""
     signal.setitimer(signal.ITIMER_REAL, 0.0)

@@ -1,4 +1,4 @@
-"""Deadlines of nodes: of the run's own, whose silence ends it, and of observers, without whom it goes on."""
+"""Deadlines of the run's own nodes, whose silence ends the run, and of observers, without which it continues."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from haploop.launch.processes.strain import NOBODY, Strain
 from haploop.launch.spec import RunFailed, RunSpec
 from haploop.protocol.transport.machine import Machine
 
-# How long the last message of a process that has exited may still be on its way.
+# How long, s, the last message of a process that has exited may still be on its way.
 LAST_WORDS_S = 1.0
-# Attached nodes that say nothing are asked this often whether they are still there.
+# Silent attached nodes are asked at this interval, s, whether they are still there.
 _PROBE_S = 0.2
-# A controller that says nothing for longer, s, is told of, though its deadline may be far.
+# A controller that is silent for longer than this, s, is reported, even if its deadline is far off.
 _TOLD_AFTER_S = 5.0
-# When the launcher itself was held up for longer (stopped, swapped out, loading a plugin), nobody is blamed for it.
+# If the launcher itself was held up for longer, s (stopped, swapped out, loading a plugin), no node is blamed for it.
 _HELD_UP_S = 1.0
 
 
 class Deadlines:
-    """Watches who is silent, from the start of the processes on.
+    """Watches which nodes are silent, from the start of the processes on.
 
     Args:
         children: the run's processes that the launcher has started, by role.
@@ -39,14 +39,15 @@ class Deadlines:
         self._standstill = Standstill(server.roster, clock, self._deadline_s)
         self._started = self._looked = machine.now()
         self._probe_due = 0.0
-        # By when the controller was last heard of: when it was roused; whether its silence was told, its stack shown.
+        # By the time at which the controller was last heard from: when it was roused, whether its silence was reported,
+        # whether its stack was shown.
         self._roused: dict[float, float] = {}
         self._told: set[float] = set()
         self._shown: set[float] = set()
         self._strain = Strain()
 
     def check(self) -> None:
-        """Raises RunFailed where one of the run's own has kept silent too long, or has done nothing."""
+        """Raises RunFailed if one of the run's own nodes has been silent for too long, or has done nothing."""
         now, roster = self._look()
         if not roster.joined():
             limit_s = max(self._deadline_s, START_DEADLINE_S)
@@ -61,14 +62,14 @@ class Deadlines:
                 raise RunFailed(f"The {roster.label(node.role)} is gone; {self.where()}")
         if self._spec.programs or self._server.results:  # once one is done, others may wait for what never comes
             self._standstill.check(now)
-        # Nodes may still load and a machine be busy with it; the deadline of the scene is that of a loop that runs.
+        # Nodes may still be loading, which keeps a machine busy; the scene's deadline is meant for a loop that runs.
         start_s = self._deadline_s if roster.common_tick() else max(self._deadline_s, START_DEADLINE_S)
         for node in roster.silent(now, min(self._deadline_s / 2, _TOLD_AFTER_S)):
             if not node.is_own:
                 continue
             pid = self._children[node.role].pid if node.role in self._children else NOBODY
             self._strain.note(pid, node.heard, now)
-            # Once all are ready haploop's own controller has loaded all: it is at its first ticks, or tells of waiting.
+            # Once all are ready, haploop's own controller has loaded all: it is at its first ticks, or reports waiting.
             is_ours = node.role == "controller" and not roster.is_external(node.role)
             is_at_work = is_ours and roster.all_own("ready")
             deadline_s = self._deadline_s if is_at_work else start_s
@@ -83,7 +84,7 @@ class Deadlines:
         self._check_observers(now)
 
     def _tell(self, node: Node, now: float) -> None:
-        """Tells once of a silence that goes on, where the deadline is far: somebody waits at a terminal."""
+        """Reports a continuing silence once if the deadline is far off: somebody waits at a terminal."""
         if _TOLD_AFTER_S < now - node.heard < self._deadline_s and node.heard not in self._told:
             self._told.add(node.heard)
             label, limit_s = self._server.roster.label(node.role), self._deadline_s
@@ -92,7 +93,7 @@ class Deadlines:
             )
 
     def _look(self) -> tuple[float, Roster]:
-        """Returns the wall time, s, and the roster, in which nobody is blamed for what held the launcher itself up."""
+        """Returns the wall time, s, and the roster, in which no node is blamed for a hold-up of the launcher itself."""
         now, roster = self._machine.now(), self._server.roster
         held_up_s, self._looked = now - self._looked, now
         if held_up_s > _HELD_UP_S:
@@ -102,7 +103,7 @@ class Deadlines:
         return now, roster
 
     def check_observers(self, ended_at: float) -> None:
-        """Takes off observers for whom a run that has ended, at a wall time in s, would wait in vain."""
+        """Removes observers for which a run that ended at ``ended_at``, wall time in s, would wait in vain."""
         now, _ = self._look()
         self._check_observers(now, ended_at)
 
@@ -114,7 +115,7 @@ class Deadlines:
             self._server.probe(self._server.roster.silent(now, _PROBE_S))
 
     def _may_rouse(self, node: Node, now: float) -> bool:
-        """Rouses a controller that hangs, once; tells whether a last word of it may still come."""
+        """Rouses a hanging controller, once; tells whether a last message from it may still come."""
         if node.role != "controller" or node.role in self._spec.programs:
             return False
         roused = self._roused.setdefault(node.heard, now)
@@ -126,7 +127,7 @@ class Deadlines:
         return now - roused < LAST_WORDS_S
 
     def where(self) -> str:
-        """Returns how far all nodes had come, a sentence's end."""
+        """Returns how far all nodes had come, as the end of a sentence."""
         tick = self._server.roster.common_tick()
         rate = self._spec.scene.clock.control_rate
         return f"the last tick all nodes had done is {tick} ({tick / rate:g} s)."

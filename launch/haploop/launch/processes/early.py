@@ -1,6 +1,6 @@
-"""The start of a run's processes, also before the run is known: they load beside their launcher until they are told.
+"""Start of a run's processes, possibly before the run is known: they load in parallel with the launcher until told.
 
-Itself it is light.
+The module itself is light to import.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from haploop.launch.one_thread import ask_for_one_thread
 from haploop.launch.processes.open_files import ask_for_many
 from haploop.protocol.transport.messages import PROCESSES
 
-# What begins with one of these asks for no such processes, or for others beside them.
+# A word that begins with one of these asks for no such processes, or for others as well.
 _OTHERS = ("--in-process", "--help", "--node", "--external", "--clock")
 
 
@@ -39,14 +39,14 @@ class Started(NamedTuple):
 
 
 def start_process(words: Sequence[str], environment: Mapping[str, str], prints: int | None, group: int) -> Started:
-    """Starts a process in a process group, 0 for one of its own.
+    """Starts a process in a process group, 0 for a new group of its own.
 
     Args:
         prints: where its output goes; None for the launcher's stderr, or nowhere if that is closed.
 
-    Raises OSError where it cannot be started.
+    Raises OSError if it cannot be started.
     """
-    # Where the kernel has no descriptor of a process: a pipe that is open as long as it lives.
+    # Where the kernel has no process descriptors: a pipe that is open as long as the process lives.
     died, alive = (-1, -1) if _has_pidfd() else os.pipe()
     try:
         process = subprocess.Popen(
@@ -71,21 +71,21 @@ def start_process(words: Sequence[str], environment: Mapping[str, str], prints: 
 
 
 def start_node(role: str) -> Started:
-    """Starts the run's own process of a role; raises OSError where it cannot be started."""
+    """Starts the run's own process of a role; raises OSError if it cannot be started."""
     environment = {**os.environ}
     ask_for_one_thread(environment)
     return start_process((sys.executable, "-m", PROCESSES[role].module), environment, None, 0)
 
 
 def start_early(words: Sequence[str], early: MutableMapping[str, Started]) -> None:
-    """Starts the processes of the run that a command line asks for, by role; none where it may need others."""
+    """Starts the processes of the run that a command line asks for, by role; none if it may need others."""
     if any(word.startswith(_OTHERS) for word in words):
         return
     ask_for_many()
     for role in PROCESSES:
         try:
             early[role] = start_node(role)
-        except OSError:  # told where it is started again
+        except OSError:  # reported when it is started again
             return
 
 

@@ -1,8 +1,8 @@
-"""The number of files that a process may open: ZeroMQ aborts one to which nobody more can connect. It is light."""
+"""The number of files that a process may open: ZeroMQ aborts one that can take no more connections. Light to import."""
 
 from __future__ import annotations
 
-# What a process of a run opens, with some to spare; and how many are asked for, since everybody who connects takes one.
+# What a process of a run opens, with some to spare; and how many are asked for, since each connection takes one.
 _LEAST, _MANY = 64, 65_536
 
 
@@ -17,13 +17,13 @@ def ask_for_many() -> float:
         try:
             resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
             soft = most
-        except (OSError, ValueError):  # what the system allows less of than it says
+        except (OSError, ValueError):  # the system allows less than it says
             pass
     return float("inf") if soft == infinite else soft
 
 
 def allow_many() -> None:
-    """Does as ``ask_for_many``; raises OutputError where they may open too few."""
+    """Does what ``ask_for_many`` does; raises OutputError if they may open too few."""
     from haploop.launch.spec import OutputError
 
     may = ask_for_many()

@@ -1,4 +1,4 @@
-"""The private directory of a run: held by its launcher's lock, and removed file by file, never more than is ours."""
+"""The private directory of a run: held by its launcher's lock, and removed file by file, only what is haploop's."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from haploop.launch.spec import OutputError
 from haploop.protocol.transport.messages import PROCESSES
 
 ENTRY, PART, LOCK = "run.json", "run.part", "lock"
-# Every name that may stand in a private directory; the lock goes last, since it says that the directory is ours.
+# Every name that may be in a private directory; the lock is removed last, as it says that the directory is haploop's.
 _SOCKETS = ("clock", *(name for process in PROCESSES.values() for name in process.binds.values()))
 _OURS = (*(f"{name}.sock" for name in _SOCKETS), *map(seat_file, ROLES), PART, ENTRY, LOCK)
 _OWNER = b"haploop"
@@ -30,7 +30,7 @@ _ADVICE = "set XDG_RUNTIME_DIR to a directory of yours."
 def base_directory() -> Path:
     """Returns the user's directory of live runs, mode 0700, below XDG_RUNTIME_DIR or the temporary directory.
 
-    Raises OutputError where it cannot be made, is a link or no directory, or is open to others.
+    Raises OutputError if it cannot be made, is a link or not a directory, or is open to others.
     """
     candidate = Path(os.environ.get("XDG_RUNTIME_DIR") or "-") / "haploop"
     try:
@@ -63,17 +63,17 @@ def _is_long(path: Path) -> bool:
 
 
 def directories() -> list[Path]:
-    """Returns what is named as a private directory of a run in the user's directory of live runs, oldest first."""
+    """Returns what is named like a run's private directory in the user's directory of live runs, oldest first."""
     found = [path for path in base_directory().iterdir() if _NAME.fullmatch(path.name)]
     return sorted(found, key=_mtime)
 
 
 @contextlib.contextmanager
 def made() -> Iterator[Path]:
-    """Makes a private directory named by the run's id, and holds its lock: the sign of life, freed by any death.
+    """Makes a private directory named by the run's id, and holds its lock: a sign of life that any death releases.
 
     At the end the files of the run are removed, and the directory unless something else is in it. Raises OutputError
-    where it cannot be made.
+    if it cannot be made.
     """
     with contextlib.ExitStack() as held:
         path = base_directory()
@@ -86,7 +86,7 @@ def made() -> Iterator[Path]:
 
 
 def _made_in(base: Path, held: contextlib.ExitStack) -> Path | None:
-    """Makes a directory that ``held`` removes; None where the name is taken, or it was cleared away unlocked."""
+    """Makes a directory that ``held`` removes; None if the name is taken, or it was cleared away unlocked."""
     path = base / secrets.token_hex(3)
     try:
         path.mkdir(mode=0o700)
@@ -107,7 +107,7 @@ def is_held(path: Path) -> bool:
     try:
         with _opened(path) as directory:
             lock = _free_lock(directory, fcntl.LOCK_SH)
-    except OSError:  # gone, or never ours
+    except OSError:  # gone, or never haploop's
         return False
     if lock is not None:
         os.close(lock)
@@ -115,7 +115,7 @@ def is_held(path: Path) -> bool:
 
 
 def clear_dead(path: Path) -> None:
-    """Removes what a dead launcher has left; a directory that is not ours, or holds anything else, stays as it is."""
+    """Removes what a dead launcher has left; one that is not haploop's, or holds anything else, stays as it is."""
     with contextlib.suppress(OSError), _opened(path) as directory:
         if not set(os.listdir(directory)) <= set(_OURS):  # noqa: PTH208 (of a descriptor)
             return
@@ -127,13 +127,13 @@ def clear_dead(path: Path) -> None:
 
 
 def read_entry(path: Path) -> bytes:
-    """Returns what stands in the entry of a run, at most 64 KiB; OSError where there is none."""
+    """Returns the content of the entry of a run, at most 64 KiB; raises OSError if there is none."""
     with _opened(path) as directory, open(_open_file(directory, ENTRY), "rb") as file:
         return file.read(1 << 16)
 
 
 def _free_lock(directory: int, kind: int) -> int | None:
-    """Takes the lock of a directory and returns its descriptor, None where somebody holds it; OSError for none."""
+    """Takes the lock of a directory and returns its descriptor, None if somebody holds it; OSError if it has none."""
     lock = _open_file(directory, LOCK)
     try:
         if os.pread(lock, len(_OWNER), 0) != _OWNER:  # another program's, or not ready
@@ -149,7 +149,7 @@ def _free_lock(directory: int, kind: int) -> int | None:
 
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[int]:
-    """Opens a directory that is no link and ours alone; OSError for any other."""
+    """Opens a directory that is not a link and belongs to this user; raises OSError for any other."""
     directory = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
         if os.fstat(directory).st_uid != os.getuid():
@@ -160,7 +160,7 @@ def _opened(path: Path) -> Iterator[int]:
 
 
 def _open_file(directory: int, name: str) -> int:
-    """Opens a regular file of ours in a directory, following no link and waiting for nobody; OSError for any other."""
+    """Opens a regular file of this user in a directory, following no link and without waiting; else raises OSError."""
     descriptor = os.open(name, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=directory)
     status = os.fstat(descriptor)
     if not stat.S_ISREG(status.st_mode) or status.st_uid != os.getuid():

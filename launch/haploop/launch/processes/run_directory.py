@@ -1,4 +1,4 @@
-"""The live runs: the entry by which other terminals find each, and the commands they send it."""
+"""The live runs: the entry by which other terminals find a run, and the commands that they send to it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _LOOK_MS = 250
 
 
 class RunNotFound(Exception):
-    """No run, or not one run, to talk to; the message lists those there are."""
+    """No run to talk to, or more than one; the message lists those there are."""
 
 
 class CommandRefused(Exception):
@@ -43,7 +43,7 @@ class LiveRun:
 
     Attributes:
         sockets: its private directory; None for a run elsewhere.
-        pid_namespace: the numbering of processes that ``pid`` belongs to.
+        pid_namespace: the numbering of processes (namespace) that ``pid`` belongs to.
     """
 
     id: str
@@ -57,11 +57,11 @@ class LiveRun:
 
     @property
     def is_here(self) -> bool:
-        """Tells whether the run is one of this machine, whose files can be read."""
+        """Tells whether the run is on this machine, where its files can be read."""
         return self.sockets is not None
 
     def make_context(self) -> SecureContext:
-        """Makes a context whose sockets may connect to the run; RunNotFound where its keys cannot be used."""
+        """Makes a context whose sockets may connect to the run; raises RunNotFound if its keys are unusable."""
         try:
             keys = read_keys(Path(self.keys), CLIENT) if self.keys else None
         except KeysError as error:
@@ -77,7 +77,7 @@ class Elsewhere(NamedTuple):
 
 
 def announce(sockets: Path, clock: str, title: str, out: str, keys: str | None = None) -> None:
-    """Writes the entry by which other terminals find the run; raises OutputError where that fails."""
+    """Writes the entry by which other terminals find the run; raises OutputError if that fails."""
     entry = {"pid": os.getpid(), "clock": clock, "title": title, "out": out, "keys": keys}
     entry["pid_namespace"] = _pid_namespace()
     temporary = sockets / PART
@@ -89,7 +89,7 @@ def announce(sockets: Path, clock: str, title: str, out: str, keys: str | None =
 
 
 def live_runs() -> list[LiveRun]:
-    """Returns all runs of this user, oldest first; the directories of dead ones are cleared away."""
+    """Returns all runs of this user, oldest first; the directories of dead runs are cleared away."""
     runs = []
     for path in directories():
         run = _read(path)
@@ -101,14 +101,14 @@ def live_runs() -> list[LiveRun]:
 
 
 def is_live(run: LiveRun) -> bool:
-    """Tells whether a launcher holds a run; of one elsewhere, only the connection to its clock can tell."""
+    """Tells whether a launcher holds a run; for one elsewhere, only the connection to its clock can tell."""
     return run.sockets is None or is_held(run.sockets)
 
 
 def has_launcher(run: LiveRun) -> bool:
-    """Tells whether the process that leads a run is there: when the run is live no more, it judges it.
+    """Tells whether the process that leads a run is there: after the run has ended, that process judges it.
 
-    One in another container, whose processes cannot be seen from here, is taken to be there.
+    A process in another container, which cannot be seen from here, is taken to be there.
     """
     if run.sockets is None or run.pid_namespace != _pid_namespace():
         return True
@@ -122,9 +122,9 @@ def has_launcher(run: LiveRun) -> bool:
 
 
 def find(which: str | Elsewhere | None) -> LiveRun:
-    """Returns the run with this id (or its beginning) or name, the only one there is, or that which answers elsewhere.
+    """Returns the run with this id (or its beginning) or name, for None the only one, or the one reached elsewhere.
 
-    Raises RunNotFound where not one fits, or the one elsewhere cannot be reached.
+    Raises RunNotFound unless exactly one fits, or if the one elsewhere cannot be reached.
     """
     if isinstance(which, Elsewhere):
         return _reach(which)
@@ -153,7 +153,7 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
     connection = Connection(context, socket, run.clock) if is_tcp else None
     try:
         connect(socket, run.clock)
-        send_at_once(socket, encode("COMMAND", verb, arguments))  # where it cannot, the connection tells why
+        send_at_once(socket, encode("COMMAND", verb, arguments))  # if it cannot, the connection says why
         answer_ms = _SWAP_MS if verb == "swap" else _ANSWER_MS
         for _ in range(answer_ms // _LOOK_MS):
             if socket.poll(_LOOK_MS):
@@ -188,7 +188,7 @@ def _named(run: LiveRun) -> str:
 
 
 def _reach(place: Elsewhere) -> LiveRun:
-    """Asks the run at an address for its title; RunNotFound, and why, where none answers."""
+    """Asks the run at an address for its title; raises RunNotFound, with the reason, if none answers."""
     keys = str(place.keys) if place.keys else None
     run = LiveRun(place.clock.removeprefix("tcp://"), None, 0, place.clock, "", "", keys)
     try:
@@ -199,7 +199,7 @@ def _reach(place: Elsewhere) -> LiveRun:
 
 
 def _pid_namespace() -> str:
-    """Returns what tells this numbering of processes from those of other containers; "" where there is none."""
+    """Returns what distinguishes this numbering of processes from that of other containers; "" if there is nothing."""
     try:
         return os.readlink("/proc/self/ns/pid")  # noqa: PTH115 (no file that is there)
     except OSError:

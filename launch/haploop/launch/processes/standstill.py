@@ -1,4 +1,4 @@
-"""Runs that stand still: one ends where its own nodes let no tick be done, and goes on without an observer."""
+"""Runs that stand still: a run ends if its own nodes let no tick be done, and continues without an observer."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def late_observers(
 
     Args:
         now: wall time, s.
-        deadline_s: how long one may be silent, s, or take nothing of a run that has ended.
-        ended_at: wall time at which it did, s; None while it goes on.
+        deadline_s: how long an observer may be silent, or take nothing from a run that has ended, s.
+        ended_at: wall time at which the run ended, s; None while it goes on.
     """
     late = []
     for node in roster.nodes.values():
@@ -37,10 +37,10 @@ def late_observers(
 
 
 class Standstill:
-    """Watches that what is granted is done, and that what was done reaches the others, the end of a run included.
+    """Watches that granted ticks are done, and that what was done reaches the other nodes, including the end of a run.
 
     Args:
-        deadline_s: how long nothing may be done once a tick has been.
+        deadline_s: how long it may last that nothing is done, once a tick has been done, s.
     """
 
     def __init__(self, roster: Roster, clock: Clock, deadline_s: float) -> None:
@@ -49,11 +49,11 @@ class Standstill:
         self._since = 0.0
 
     def discount(self, seconds: float) -> None:
-        """Leaves some time out."""
+        """Excludes some time, s, from the standstill."""
         self._since += seconds
 
     def check(self, now: float) -> None:
-        """Raises RunFailed where nothing that is due was done for longer than the deadline; ``now`` is wall time, s."""
+        """Raises RunFailed if nothing that is due was done for longer than the deadline; ``now`` is wall time, s."""
         roster, clock = self._roster, self._clock
         own = [node for node in roster.nodes.values() if node.is_own]
         is_due = not roster.all_own("ready") or roster.common_tick() < clock.until or clock.is_last

@@ -1,4 +1,4 @@
-"""Strain on a machine, which may be why a process of it says nothing: what the system tells of a silent one."""
+"""Strain on a machine, which may be why a process on it is silent: what the system reports about such a process."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ _STATES = {
 _STARVED = " It was ready to go on, but got next to no processor time."
 _AT_WORK = " It was at work all the while."
 _BUSY = " The machine was busy: load average {:.0f} on {} cores."
-# A process that got less of a processor, as a share of the time, was kept waiting for it; one that got more worked.
+# Shares of the time for which a process had a processor: with less than the first it was kept waiting for one, with
+# more than the second it was working.
 _LITTLE, _MUCH = 0.1, 0.5
 # In place of the pid of a process on another host.
 NOBODY = -1
 
 
 class Strain:
-    """What silent processes were doing, as far as the system tells it, which is where there is /proc.
+    """What silent processes were doing, as far as the system reports it, which it does where there is /proc.
 
-    ``look`` returns the state of a process by its pid, a letter, and the processor time that it has used, s.
+    ``look`` takes a pid and returns the state of that process, a letter, and the processor time that it has used, s.
     """
 
     def __init__(self, look: Callable[[int], tuple[str, float]] | None = None) -> None:
@@ -31,12 +32,12 @@ class Strain:
         self._first: dict[int, tuple[float, float, float]] = {}
 
     def note(self, pid: int, heard: float, now: float) -> None:
-        """Takes note of a process that is silent, at wall time ``now`` and last heard of at ``heard``, s."""
+        """Records that a process is silent at wall time ``now`` and was last heard from at ``heard``, s."""
         if self._first.get(pid, (0.0,))[0] != heard:
             self._first[pid] = heard, now, self._look(pid)[1]
 
     def told(self, pid: int, now: float) -> str:
-        """Returns sentences on what may have kept one that was noted before from answering; "" for nothing."""
+        """Returns sentences on what may have kept a process noted before from answering; "" if there is nothing."""
         state, used_s = self._look(pid)
         _, since, used_then_s = self._first[pid]
         share = (used_s - used_then_s) / max(now - since, 1e-3)
@@ -48,7 +49,7 @@ class Strain:
 
 
 def _state(pid: int) -> tuple[str, float]:
-    """Returns the state of a process, a letter, and the processor time it has used, s; ("", 0) where none is told."""
+    """Returns the state of a process, a letter, and the processor time it has used, s; ("", 0) if unknown."""
     try:
         words = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
     except OSError:

@@ -36,14 +36,14 @@ from haploop.protocol.transport.wire import Message
 if TYPE_CHECKING:
     from haploop.logger.summary import Summary
 
-# From directory of sockets, what the node of a role is told at its start, whether cores are pinned, the number of the
-# run, and programs that take the place of its own.
+# Starts the nodes, given the directory of sockets, what the node of a role is told at its start, whether cores are
+# pinned, the number of the run, and the foreign programs that take the place of its own.
 Start = Callable[[Path, Callable[[str], Message], bool, int, Mapping[str, Program]], dict[str, Child]]
 
-# What those that were heard of within this time are given to hand over their last blocks after a node has failed, and
-# the logger to save its files then; on a busy machine that takes its time.
+# After a node has failed, in s: nodes heard from within the first time have the second to hand over their last blocks;
+# then the logger has the third to save its files, which on a busy machine takes a while.
 _SILENT_S, _HANDING_S, _SAVING_S = 0.5, 1.0, 2.0
-# Between looks at nodes that say nothing; commands, reports and deaths are noticed at once.
+# Time between looks at silent nodes; commands, reports and deaths are noticed at once.
 _LOOK_MS = 100
 
 
@@ -53,14 +53,14 @@ def run_processes(
     start_nodes: Start = start_children,
     interrupts: Callable[..., AbstractContextManager[list[int]]] = interrupts,
 ) -> tuple[Summary, list[tuple[int, Event]]]:
-    """Runs to the end; returns the summary, and every event with its tick.
+    """Carries out a run to its end; returns the summary, and every event with its tick.
 
     The first SIGINT or SIGTERM ends the run in order, with a summary of what ran; the second at once.
 
     Raises:
-        NeverBegan: no program joined that somebody else was to start.
+        NeverBegan: a program that somebody else was to start did not join.
         RunFailed: a process was killed, hung or could not go on; nothing of the run is left but its files.
-        OutputError: sockets or processes cannot be made, or too few files opened.
+        OutputError: sockets or processes cannot be made, or too few files can be opened.
         KeyboardInterrupt: the second signal came.
     """
     open_files.allow_many()
@@ -78,7 +78,7 @@ def run_processes(
 
 
 def _with_lateness(summary: Summary, lateness: Message, out: Path, machine: Machine) -> Summary:
-    """Puts into the summary of a run, on disk, too, how late its ticks were; leaves that of a run in no real time."""
+    """Adds to a run's summary, also on disk, how late its ticks were; that of a run in no real time stays as it is."""
     if lateness:
         from haploop.logger.session import write_summary
 
@@ -125,7 +125,7 @@ class Supervisor:
             if role in spec.programs and spec.programs[role].is_external:  # perhaps on another host
                 own = {"address": self._server.address, "transport": transport.of(role, elsewhere=True).as_dict()}
                 return start | own
-            # One of this machine ends with its launcher, and may wait for one that is stopped.
+            # A node on this machine ends with its launcher, and may wait for one that is stopped.
             return {**start, "transport": replace(transport.of(role), patience_s=0.0).as_dict()}
 
         self._told_to = told_to
@@ -133,7 +133,7 @@ class Supervisor:
         self._external = [program for program in spec.programs.values() if program.is_external]
         self._children: dict[str, Child] = {} if self._external else self._start_nodes()
         self._deadlines = self._watch()
-        if not math.isinf(spec.pace):  # the nodes are loading
+        if not math.isinf(spec.pace):  # while the nodes are loading
             self._clock.prepare()
         self._stopping = False
 
@@ -142,7 +142,7 @@ class Supervisor:
 
     def run(self) -> Summary:
         failed = True
-        gc.freeze()  # all that was loaded: a collection that went through it would hold the clock for some 50 ms
+        gc.freeze()  # all that was loaded: a collection that went through it would hold up the clock for some 50 ms
         try:
             address = f" at {self._server.address}" if self._spec.transport.host else ""
             self._spec.on_started(self._sockets.name + address)
@@ -199,14 +199,14 @@ class Supervisor:
             child.wait(self._spec.transport.linger_s + 1.0)
 
     def _let_go(self) -> None:
-        """Lets every process end that is done, unless somebody still follows who may miss nothing."""
+        """Lets every process that is done end, unless a node that may miss nothing still follows."""
         if not self._server.roster.followers():
             for role in self._server.results.keys() & self._held:
                 self._held.remove(role)
                 self._children[role].let_go()
 
     def _see_off(self) -> None:
-        """Keeps what was published until all who may miss nothing have it; a signal, or their deadline, ends that."""
+        """Keeps what was published until all who may miss nothing have it; a signal, or their deadline, ends this."""
         signals, ended_at = len(self._interrupts), self._machine.now()
         while self._server.roster.followers() and len(self._interrupts) == signals:
             self._server.socket.poll(_LOOK_MS)
@@ -216,13 +216,13 @@ class Supervisor:
             self._children[role].let_go()
 
     def _look_at(self, child: Child) -> None:
-        """Takes note that a process has ended: in order after DONE, otherwise the run fails."""
+        """Deals with the end of a process: it is in order after DONE, otherwise the run fails."""
         ended = child.exit_description()
         given_up = self._machine.now() + (LAST_WORDS_S if child.exited() else 0.0)
         self._server.serve()
         while not ((node := self._server.roster.own(child.role)) and node.done):
             if self._machine.now() > given_up:
-                # Whoever was killed was not turned away: such a JOIN was somebody else's.
+                # A process that was killed was not refused: the refused JOIN was somebody else's.
                 refused = self._server.roster.refused.get(child.role) if not node and child.exited() else None
                 raise RunFailed(
                     f"The {self._server.roster.label(child.role)} {ended}; {refused or self._deadlines.where()}"
@@ -240,7 +240,7 @@ class Supervisor:
             self._server.serve()
 
     def _save(self, reason: str) -> None:
-        """Has those that answer hand their last blocks to the logger, ends them, and lets it write what it has."""
+        """Has the nodes that answer hand their last blocks to the logger, ends them, and lets it write what it has."""
         roster, loop = self._server.roster, [child for role, child in self._children.items() if role != "logger"]
         lost = {node.role for node in roster.silent(self._machine.now(), _SILENT_S)}
         lost |= {child.role for child in loop if child.wait(0.0)}
