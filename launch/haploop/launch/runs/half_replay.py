@@ -1,4 +1,4 @@
-"""Repeating the half of a run that was haploop's own, where a program of somebody else's took the other's place."""
+"""Repeats the half of a run that was haploop's own, if a foreign program took the place of the other half."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ _PROGRAM = {"name": str, "version": str, "command": str, "own": bool}
 
 
 def foreign_programs(recorded: Recording, scene: Scene) -> dict[str, Message]:
-    """Returns the programs that took the place of plant or controller by role, as the log of a run names them.
+    """Returns the foreign programs that took the place of plant or controller by role, as the log of a run names them.
 
-    The plant of a scene whose hand is unmodelled was none of haploop's, whatever the log says.
+    The plant of a scene with an unmodelled hand was not haploop's, whatever the log says.
 
-    Raises LogError where what the log holds of them is something else.
+    Raises LogError if what the log holds in their place is something else.
     """
     try:
         programs = json.loads(recorded.attachments.get(PROGRAMS, b"{}"))
@@ -55,16 +55,16 @@ def foreign_programs(recorded: Recording, scene: Scene) -> dict[str, Message]:
 
 
 def named(foreign: Mapping[str, Message]) -> str:
-    """Returns whose programs had these roles, for people: "the plant was Bench 2.1 (./bench --fast)"."""
+    """Returns which programs had these roles, for people: "the plant was Bench 2.1 (./bench --fast)"."""
     return " and ".join(f"the {role} was {described(program)}" for role, program in foreign.items())
 
 
 def repeat_controller(
     scene: Scene, kinds: Mapping[str, type[Element]], events: list[tuple[int, Event]], recorded: Recording
 ) -> Recording:
-    """Computes our controller again from the recorded samples and returns what it would have logged.
+    """Runs haploop's controller again on the recorded samples and returns what it would have logged.
 
-    That is as far as it comes, where an element gives no force.
+    If an element gives no force, the recording ends there.
     """
     rows, time = recorded["/controller"], Timebase.from_scene(scene)
     controller, memory = Controller(scene, time, dict(kinds)), MemoryLog()
@@ -84,9 +84,9 @@ def repeat_controller(
 def beside_own(
     role: str, scene: Scene, kinds: Mapping[str, type[Element]], events: list[tuple[int, Event]], recorded: Recording
 ) -> str:
-    """Returns how far what took a role went from what haploop's own would have done in its place, a sentence.
+    """Returns a sentence on how far the foreign program in a role departed from what haploop's own would have done.
 
-    Changes that were refused are left out; "" where the log does not hold what haploop's own would have to be told.
+    Refused changes are left out; "" if the log does not hold what haploop's own would have to be told.
     """
     refused = iter(change.refused is not None for change in changes_of(events))
     made = [(tick, event) for tick, event in events if not (is_change(event) and next(refused))]
@@ -124,7 +124,7 @@ def _blocks(scene: Scene, ticks: int) -> Iterator[slice]:
 def repeat_plant(
     scene: Scene, events: list[tuple[int, Event]], recorded: Recording
 ) -> tuple[dict[str, dict[str, Floats]], str]:
-    """Moves our plant again under the recorded commands, up to where the log of the controller ends.
+    """Moves haploop's plant again under the recorded commands, up to the end of the controller's log.
 
     Returns:
         What it would have logged, with its samples as ``x`` of ``/controller``; and the SHA-256 of the trajectory.

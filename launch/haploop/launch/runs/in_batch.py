@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Kinds = dict[str, "type[Element]"]
 T = TypeVar("T")
-# Fewer members of one structure are sooner run one by one; more than so many at once outgrow the cache.
+# Fewer members of one structure than the first run faster one by one; more than the second at once outgrow the cache.
 FEWEST, MOST = 16, 2048
 
 
@@ -42,7 +42,7 @@ def batch_results(
     fewest: int = FEWEST,
     most: int = MOST,
 ) -> Iterator[tuple[int, Summary]]:
-    """Runs resolved scenes to their ends; results are yielded part by part, so that none of them need be kept.
+    """Runs resolved scenes to their ends; results are yielded part by part, so that none of them needs to be kept.
 
     Args:
         scenes: of any structure; scenes that differ in numbers alone are run together.
@@ -51,8 +51,8 @@ def batch_results(
         fewest, most: members of a batch.
 
     Yields:
-        The index of a scene and the entries of its summary but for those of the machine, ``energy`` and
-        ``trajectory_sha256`` only where asked for. A run that failed has ``title``, ``seed``, ``ended`` and ``why``.
+        The index of a scene and the entries of its summary except those of the machine, ``energy`` and
+        ``trajectory_sha256`` only if asked for. A run that failed has ``title``, ``seed``, ``ended`` and ``why``.
     """
     alone = set(range(len(scenes)))
     for group in groups(scenes):
@@ -71,7 +71,7 @@ def groups(scenes: Sequence[Scene]) -> list[list[int]]:
     found: dict[Hashable, list[int]] = {}
     fits: dict[Hashable, bool] = {}
     for index, (scene, shape) in enumerate(zip(scenes, structures(scenes), strict=True)):
-        # Of one structure all can be or none, but for chains, whose numbers decide, too.
+        # Of one structure either all can be or none; only for chains do the numbers decide as well.
         if shape not in fits or needs_chain(scene):
             fits[shape] = is_batchable(scene)
         if fits[shape]:
@@ -80,9 +80,9 @@ def groups(scenes: Sequence[Scene]) -> list[list[int]]:
 
 
 def _chunks(scenes: Sequence[Scene], group: list[int], fewest: int, most: int) -> list[list[int]]:
-    """The group in as few parts as can be, equally long; none where it is too small.
+    """Returns the group in as few parts as possible, of equal length; none if it is too small.
 
-    With friction a part has no more devices than are kept in mind. One that is left alone is none.
+    With friction a part has no more devices than a process keeps. A part of a single scene is left out.
     """
     if len(group) < fewest:
         return []
@@ -96,17 +96,17 @@ def _chunks(scenes: Sequence[Scene], group: list[int], fewest: int, most: int) -
 
 
 def _parts(whole: list[T], most: int) -> list[list[T]]:
-    """A list in as few parts as can be, as good as equally long."""
+    """Returns a list in as few parts as possible, of nearly equal length."""
     parts = -(-len(whole) // most)
     bounds = [len(whole) * part // parts for part in range(parts + 1)]
     return [whole[first:last] for first, last in pairwise(bounds)]
 
 
 def _together(scenes: Sequence[Scene], kinds: Kinds, energy: bool, trajectories: bool) -> Sequence[Summary | None]:
-    """The results of scenes of one structure; None where a scene has to be run alone.
+    """Returns the results of scenes of one structure; None where a scene has to be run alone.
 
     An element that takes no arrays, or keeps attributes of its own, raises here, and whatever raises for one member
-    stops all: alone, every one comes to its own end.
+    stops all: run alone, each scene comes to its own end.
     """
     try:
         batch = Batch(scenes, kinds, energy=energy, trajectories=trajectories)
@@ -119,7 +119,7 @@ def _together(scenes: Sequence[Scene], kinds: Kinds, energy: bool, trajectories:
 def with_verdicts(batch: Batch, scenes: Sequence[Scene]) -> list[Summary | None]:
     """Returns the results of a batch that has run, with the verdicts that its scenes ask for.
 
-    None where a scene has to be run alone: a single one that is left to be judged is no batch.
+    None where a scene has to be run alone: if a single one is left to be judged, it is no batch.
 
     Raises:
         ElementError: an element raised while its loop was watched.

@@ -1,4 +1,4 @@
-"""Many scenes at once by the same code compiled, on a CPU or a GPU (needs the extra ``haploop[jax]``)."""
+"""Many scenes at once with the same code, compiled, on a CPU or a GPU (needs the extra ``haploop[jax]``)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from haploop.plant.choose import needs_chain
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.ticks import Timebase
 
-# Arrays are of the greatest size, or of a half, a quarter or an eighth of it: few sizes have to be compiled.
+# Arrays have the largest size, or a half, a quarter or an eighth of it: few sizes have to be compiled.
 _PARTS = (8, 4, 2, 1)
-# Ticks of members that take about as long as compiling a program does.
+# Ticks, summed over members, that take about as long as compiling a program.
 LEAST = 5_000_000
 
 
@@ -24,23 +24,23 @@ def compiled_results(
     scenes: Sequence[Scene], kinds: Kinds, *, energy: bool = True, fewest: int = FEWEST, most: int | None = None,
     least: int = LEAST,
 ) -> Iterator[tuple[int, Summary]]:  # fmt: skip
-    """Runs resolved scenes to their ends, by one compiled program for all scenes that differ in numbers alone.
+    """Runs resolved scenes to their ends, with one compiled program for all scenes that differ in numbers alone.
 
     The tick of a batch, a function of its parameters and its state, is traced on jax's placeholders, compiled, and kept
-    for as long as the process lives. The first ticks and those after a change are done by ``Batch``. What is random
-    comes from the same streams. It runs where jax does by default; on GPUs it has been compiled, but never yet run.
+    for as long as the process lives. The first ticks and those after a change are done by ``Batch``. Random numbers
+    come from the same streams. It runs on jax's default device; on GPUs it has been compiled, but never yet run.
 
-    **Tolerance.** Every operation is the same in float64, but for products and sums that the compiler makes in one
-    rounding. Positions stay within 1e-11 of the largest excursion of the scene alone while no rounding of the encoder,
-    contact, gate or window of an estimator falls to the other side; where one does, the run is another of the same
-    kind from there on, so in long limit cycles it is amplitude and energies that agree, not instants. The books
-    balance to 1e-14 of the energy that moved: what single additions lose is kept block by block, not tick by tick.
+    **Tolerance.** Every operation is the same in float64, except for products and sums that the compiler makes in one
+    rounding. Positions stay within 1e-11 of the largest excursion from those of the scene run alone while no rounding
+    of the encoder, contact, gate or window of an estimator falls to the other side. Where one does, the run from there
+    on is a different one of the same kind, so in long limit cycles amplitude and energies agree, but not instants. The
+    books balance to 1e-14 of the energy that moved: what single additions lose is kept by block, not by tick.
 
     Args:
-        scenes, kinds, energy, fewest: as for ``batch_results``, by which a scene is run that cannot be compiled: one
-            with bodies in a row, friction, jitter, loss, or an element that asks what its numbers are.
-        most: members of a batch; what suits the device where it is None.
-        least: scenes of a structure are compiled when so many ticks of them have been asked for in this process.
+        scenes, kinds, energy, fewest: as for ``batch_results``, which also runs the scenes that cannot be compiled:
+            those with bodies in a row, friction, jitter, loss, or an element that asks what its numbers are.
+        most: members of a batch; None for what suits the device.
+        least: a structure is compiled once this many ticks of its scenes have been asked for in this process.
 
     Yields:
         The index of a scene and the entries of its summary, as ``batch_results`` does without ``trajectories``.
@@ -48,7 +48,7 @@ def compiled_results(
     Raises:
         ImportError: jax is not installed.
     """
-    suits: int = _programs().most()  # asked for in any case: it also tells jax how to compile
+    suits: int = _programs().most()  # called in any case: it also tells jax how to compile
     size = suits if most is None else most
     left = set(range(len(scenes)))
     for group in groups(scenes):
@@ -83,7 +83,7 @@ def _is_worth_compiling(scene: Scene, members: int, least: int) -> bool:
 
 
 def _together(scenes: list[Scene], kinds: Kinds, energy: bool, most: int) -> list[Summary | None]:
-    """The results of scenes of one structure; None where a scene has to be run by ``batch_results``."""
+    """Returns the results of scenes of one structure; None where a scene has to be run by ``batch_results``."""
     from haploop.launch.batch.jax.batch import CompiledBatch
     from haploop.launch.batch.jax.tick import NotCompilable
 

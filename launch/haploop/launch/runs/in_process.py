@@ -49,14 +49,14 @@ def run_in_process(
     Args:
         out: directory for log and summary; no file is written when None.
         attachments: text files for the log, by name.
-        events: (tick, event) in order; the scene's own when None. Pauses are of the wall clock and change nothing.
-        on_progress: called now and then with the logger's status.
+        events: (tick, event) in order; the scene's own when None. Pauses concern the wall clock and change nothing.
+        on_progress: called from time to time with the logger's status.
         memory: where to log without a directory.
         stop: asked after every block; True ends the run there.
         causes: whether a loop that swings at the end is tried without its delay, counts and elements.
 
     Raises:
-        RunFailed: an element raised, or gave something that is no number.
+        RunFailed: an element raised, or gave something that is not a number.
         LogError: the log could not be written.
     """
     time = Timebase.from_scene(scene)

@@ -1,4 +1,4 @@
-"""Judging a run in a process of its own, ``python -m haploop.launch.runs.judging``, where the code of plugins runs."""
+"""Judges a run in a separate process, ``python -m haploop.launch.runs.judging``, in which the code of plugins runs."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from haploop.protocol.scene.scene import Scene
 
 _DIED = "The process that judged it ended with status {}."
 _HANGS = "The code of its plugins did not come back within {:g} s as it was judged."
-# An exchange may take so many times the silence that a run endures in a node: nobody waits for its forces.
+# An exchange may take this many times the silence that a run tolerates in a node: nobody waits for its forces.
 _PATIENCE = 4.0
 
 
 def judge_elsewhere(scene: Scene, plugins: Sequence[Path], events: list[tuple[int, Event]]) -> Finding:
-    """Returns the finding of a run with these plugin files and events; undecided where its process dies or hangs."""
+    """Returns the finding of a run with these plugin files and events; undecided if its process dies or hangs."""
     judging = subprocess.Popen(
         [sys.executable, "-m", "haploop.launch.runs.judging"],
         stdin=subprocess.PIPE,
@@ -55,7 +55,7 @@ def find(
     events: list[tuple[int, Event]],
     on_exchange: Callable[[], object] = lambda: None,
 ) -> Finding:
-    """Judges a run here, with the code of these kinds; undecided where it fails."""
+    """Judges a run in this process, with the code of these kinds; undecided if it fails."""
     try:
         return judge_scene(scene, kinds, events, LOOKS_S, thorough=True, causes=True, on_exchange=on_exchange)
     except (ElementError, ArithmeticError) as error:
@@ -63,9 +63,9 @@ def find(
 
 
 def main() -> None:
-    """Reads what is to be judged on stdin, writes the finding on what was stdout; what plugins print goes nowhere.
+    """Reads what is to be judged from stdin, writes the finding to the original stdout; what plugins print is dropped.
 
-    SIGALRM ends the process where an exchange takes too long, whatever the code of a plugin does.
+    SIGALRM ends the process if an exchange takes too long, whatever the code of a plugin does.
     """
     given, plugins, events = pickle.load(sys.stdin.buffer)
     with os.fdopen(os.dup(1), "wb") as answers:

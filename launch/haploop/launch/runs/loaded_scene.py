@@ -1,4 +1,4 @@
-"""A scene in Python's hands: read from its file, changed without being changed, ready to run."""
+"""A scene in Python: read from its file, ready to run; a change gives a new scene."""
 
 from __future__ import annotations
 
@@ -27,18 +27,19 @@ SET_SO = 'Values are set by key: set({"wall.stiffness": 200}), in mid-run set({"
 
 @dataclass(frozen=True, eq=False)
 class LoadedScene:
-    """A scene that can be run; every change gives a new one, which can be run too, and leaves this one as it is.
+    """A scene that can be run; every change gives a new one, which can be run too, and leaves this one unchanged.
 
-    A value is a number in SI units, text with its unit (``"0.2 N/mm"``) or a quantity of pint. ``scene["wall"]`` is a
-    table of it in SI units, ``scene["wall.stiffness"]`` a number; ``print(scene)`` shows all of them.
+    A value is a number in SI units, text with its unit (``"0.2 N/mm"``) or a quantity of pint. ``scene["wall"]`` is one
+    of its tables in SI units, ``scene["wall.stiffness"]`` a number; ``print(scene)`` shows all of them.
 
     Attributes:
-        scene: what it holds, typed.
+        scene: its content, typed.
         path: the file it was read from.
-        kinds: the elements at hand, by kind.
+        kinds: the available elements, by kind.
         plugin_files: the file of each kind that came from one.
         plugins: the plugin files that it was loaded with.
-        brought: walls, estimators and hand forces of these; what is loaded later may take their names in this process.
+        brought: walls, estimators and hand forces of these files; files loaded later may take over their names in this
+            process.
     """
 
     scene: Scene
@@ -54,12 +55,12 @@ class LoadedScene:
 
     @property
     def tables(self) -> Tables:
-        """All tables, copied: plain dicts, all numbers SI, defaults filled in, absent tables absent."""
+        """All tables, copied: plain dicts, all numbers in SI units, defaults filled in, absent tables left out."""
         return self.scene.as_dict()
 
     @property
     def notes(self) -> list[str]:
-        """What is in order but may not be what was meant, a sentence each, as ``haploop check`` tells it."""
+        """What is valid but may not be what was meant, a sentence each, as ``haploop check`` tells it."""
         from haploop.launch.plan.effects import notes
 
         return [str(note) for note in notes(self.scene, self.kinds)]
@@ -94,11 +95,11 @@ class LoadedScene:
         Args:
             values: by dotted key, ``{"wall.stiffness": 200, "dissipation.0.mass": "20 g"}``, or as on the command line,
                 ``["wall.stiffness=200"]``.
-            at: when they change in mid-run, in s or text with its unit; None for the start. In mid-run only wall,
+            at: time of a change in mid-run, in s or text with its unit; None for the start. In mid-run only wall,
                 delay and the elements' parameters can be set.
 
         Raises:
-            SceneError: such a scene could not be run; it holds every mistake.
+            SceneError: such a scene could not be run; the error holds every mistake.
             ElementError: an element's own code does not take its parameters.
         """
         if isinstance(values, str):
@@ -112,17 +113,17 @@ class LoadedScene:
         return self._with_event({"at": plain(at), "set": plain(values)}, "set")
 
     def swap(self, kind: str | type[Element], *, at: Any, element: int = 0, **parameters: Any) -> LoadedScene:
-        """Returns the scene with an element that is swapped in in mid-run.
+        """Returns the scene with an element that is swapped in during the run.
 
         Args:
-            kind: of the new element, or its class; "none" removes the one there is.
-            at: when, in s or text with its unit; the first tick then or later sees it.
+            kind: kind of the new element, or its class; "none" removes the present one.
+            at: time of the swap, in s or text with its unit; the first tick then or later sees it.
             element: which element is replaced, counted from 0; one past the end adds one.
-            parameters: of the new element, ``acts`` included.
+            parameters: parameters of the new element, including ``acts``.
 
         Raises:
             SceneError, ElementError: as for ``set``.
-            PluginError: the class is no usable element.
+            PluginError: the class is not a usable element.
         """
         scene, name = self, kind
         if not isinstance(kind, str):
@@ -133,7 +134,7 @@ class LoadedScene:
         return scene._with_event({"at": plain(at), "swap": table, "element": element}, "swap")
 
     def _with_event(self, event: Tables, by: str) -> LoadedScene:
-        """Returns the scene with one event more; its mistakes are those of the method ``by``, not of the file."""
+        """Returns the scene with one more event; its mistakes are reported for the method ``by``, not for the file."""
         layers = Layers(self.path, self.tables)
         events = layers.data.setdefault("event", [])
         layers.origins["event", len(events)] = by
@@ -152,13 +153,13 @@ def load(
 
     Args:
         path: the scene file (TOML).
-        values: laid over what it says, as in ``LoadedScene.set``.
-        elements: element classes that may be named by their kind, in this scene and in those made of it.
+        values: override those of the file, as in ``LoadedScene.set``.
+        elements: element classes that may be named by their kind, in this scene and in those made from it.
         plugins: files that define elements, walls, estimators or hand forces.
 
     Raises:
-        SceneError: the scene cannot be run; it holds every mistake.
-        PluginError: a file defines nothing usable, or a class is no usable element.
+        SceneError: the scene cannot be run; the error holds every mistake.
+        PluginError: a file defines nothing usable, or a class is not a usable element.
         ElementError: an element's own code does not take its parameters.
     """
     kinds, files = registry(), {}
@@ -172,10 +173,10 @@ def load(
 
 
 def texts(values: Values) -> list[str]:
-    """Values as the command line takes them: ``KEY=VALUE``.
+    """Returns values as the command line takes them: ``KEY=VALUE``.
 
     Raises:
-        TypeError: a value is of a kind that no scene holds, or the values are one text.
+        TypeError: a value is of a type that no scene holds, or the values are a single text.
     """
     if isinstance(values, str):
         raise TypeError(SET_SO)

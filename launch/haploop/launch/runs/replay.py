@@ -1,4 +1,4 @@
-"""Repeating a run from its own log: the scene, the plugins and every event, live ones included."""
+"""Repeats a run from its own log: the scene, the plugins and every event, live ones included."""
 
 from __future__ import annotations
 
@@ -41,11 +41,12 @@ class Replay:
     """The outcome of repeating a run.
 
     Attributes:
-        summary: of the repetition.
+        summary: summary of the repetition.
         differences: where recorded and repeated run disagree, as sentences; empty when every bit agreed.
         cut: where the log ends if it was cut off, else "".
-        half: of a run of which but one half was haploop's own, which one was repeated and whose the other was; else "".
-        other: of such a run, how far the other half was from what haploop's own would have done in its place.
+        half: if only one half of the run was haploop's own, which half was repeated and what program the other was;
+            else "".
+        other: for such a run, how far the other half was from what haploop's own would have done in its place.
     """
 
     summary: Summary
@@ -58,9 +59,9 @@ class Replay:
 def replay(directory: Path) -> Replay:
     """Repeats a run from its log, in one process, and compares bit by bit.
 
-    The whole trajectory is compared where the summary holds its digest, and every logged step, tick and book. Where a
-    program of somebody else's was the plant, the controller is repeated from the recorded samples; where one was the
-    controller, the plant from the recorded commands.
+    Every logged step, tick and book is compared, and the whole trajectory if the summary holds its digest. If the plant
+    was a foreign program, the controller is repeated from the recorded samples; if the controller was one, the plant is
+    repeated from the recorded commands.
 
     Raises:
         ReplayError, LogError, SceneError: the directory does not hold a run that can be repeated.
@@ -124,7 +125,7 @@ def logged_run(directory: Path) -> Recording:
     """Returns the log of a run that can be repeated, from its first tick on.
 
     Raises:
-        ReplayError: there is no log, or none from tick 0 on, or it holds no tick.
+        ReplayError: there is no log, it does not start at tick 0, or it holds no tick.
         LogError: it cannot be read.
     """
     try:
@@ -140,7 +141,7 @@ def logged_run(directory: Path) -> Recording:
 
 
 def demand_own(recorded: Recording, scene: Scene) -> None:
-    """Raises ReplayError where plant or controller of a run was somebody else's, so that its loop cannot be judged."""
+    """Raises ReplayError if plant or controller of a run was a foreign program, so that its loop cannot be judged."""
     if foreign := foreign_programs(recorded, scene):
         raise ReplayError(
             f"Whether this loop is stable cannot be said: {named(foreign)}, "
@@ -149,7 +150,7 @@ def demand_own(recorded: Recording, scene: Scene) -> None:
 
 
 def repeatable(directory: Path, recorded: Recording) -> tuple[Scene, dict[str, type[Element]], list[tuple[int, Event]]]:
-    """Returns what a run can be repeated from: its scene, the elements at hand, and every event by its tick.
+    """Returns what a run can be repeated from: its scene, the available elements, and every event with its tick.
 
     Args:
         recorded: its log, as ``logged_run`` returns it.
@@ -162,7 +163,7 @@ def repeatable(directory: Path, recorded: Recording) -> tuple[Scene, dict[str, t
     if scene is None:
         raise ReplayError(f"{directory} holds no {SCENE}; a directory that haploop run has written was expected.")
     events = [_event(dict(event), directory) for event in recorded.get("/events", [])]
-    # One that was cut off is repeated as far as its log goes.
+    # A run that was cut off is repeated as far as its log goes.
     return scene, kinds, [*events, (len(recorded["/controller"]["x"]), {"stop": True})]
 
 
@@ -178,13 +179,13 @@ def _compare_scenes(directory: Path, recorded: Recording) -> list[str]:
 
 
 def _launch_plugins(directory: Path, recorded: Recording) -> list[Path]:
-    """Files of the plugins the run began with; those taken up later stand in its events."""
+    """Returns the files of the plugins the run began with; those taken up later are in its events."""
     names = [name for name in recorded.attachments if name.startswith(f"{PLUGINS}/")]
     return [_kept_plugin(directory, name) for name in names]
 
 
 def _kept_plugin(directory: Path, name: str) -> Path:
-    """Returns the file of a plugin in the directory of its run, the very one: its name ends with its digest."""
+    """Returns the file of a plugin in the directory of its run, the very same one: its name ends with its digest."""
     path = directory / PLUGINS / Path(name).name
     if not path.is_file():
         raise ReplayError(f"{path} is missing; the run cannot be repeated without its plugin.")
@@ -194,7 +195,7 @@ def _kept_plugin(directory: Path, name: str) -> Path:
 
 
 def _event(event: Event, directory: Path) -> tuple[int, Event]:
-    """Returns tick and event of a logged event, its plugin looked for in the run's directory."""
+    """Returns tick and event of a logged event; its plugin is loaded from the run's directory."""
     del event["timestamp"]
     tick = event.pop("tick")
     if "plugin" in event:
@@ -205,9 +206,9 @@ def _event(event: Event, directory: Path) -> tuple[int, Event]:
 
 
 def _compare(recorded: Mapping[str, Any], repeated: Mapping[str, Any], failed: bool) -> list[str]:
-    """Differences between two logs as far as the recorded one goes, one sentence a column.
+    """Returns the differences between two logs as far as the recorded one goes, one sentence per column.
 
-    Where a failed run broke off, the force of its end state is the one held before, not the one that would follow.
+    The force in the end state of a failed run is left out: it is the one held before, not the one that would follow.
     """
     differences = []
     for topic in ("/plant", "/controller", "/energy"):

@@ -1,4 +1,4 @@
-"""Running a scene from Python, and what comes of it: the summary, and every channel with its units."""
+"""Runs a scene from Python and holds the result: the summary, and every channel with its units."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ if TYPE_CHECKING:
     import pint
 
 
-# What the end of a summary's key says of its unit; the first that fits counts.
+# The unit that the end of a summary's key stands for; the first end that fits counts.
 _UNITS = {"_Hz": "Hz", "_N_m": "N/m", "_m_s": "m/s", "_1_s": "1/s", "_m": "m", "_s": "s", "_N": "N", "_J": "J"}
 
 
 def unit_of(key: str) -> str:
-    """Returns the unit of a number of a summary, by its key; "" for none."""
+    """Returns the unit of a number in a summary, by its key; "" if it has none."""
     return next((unit for end, unit in _UNITS.items() if key.endswith(end)), "")
 
 
 def _numbers(entry: Any, key: str = "") -> Iterator[tuple[str, float | None]]:
-    """Yields the numbers of a summary, or None where the run did not come to one, by dotted key."""
+    """Yields the numbers of a summary by dotted key; None for a number that the run did not produce."""
     if isinstance(entry, dict | list):
         for name, inner in entry.items() if isinstance(entry, dict) else enumerate(entry):
             yield from _numbers(inner, f"{key}.{name}".lstrip("."))
@@ -55,8 +55,8 @@ class Result:
 
     Attributes:
         scene: what was run.
-        summary: as in ``summary.json``; the unit of a number stands at the end of its key.
-        directory: where the run left its files, None when it left none.
+        summary: as in ``summary.json``; a number's key ends with its unit.
+        directory: where the run left its files; None if it left none.
     """
 
     scene: LoadedScene
@@ -76,19 +76,19 @@ class Result:
     def verdict(self) -> str:
         """``steady``, ``limit-cycle``, ``growing``, ``diverged``, ``no-contact`` or ``undecided``.
 
-        ``no-swing-seen`` or ``swinging`` where the run was not pushed and its last half second alone was looked at.
+        ``no-swing-seen`` or ``swinging`` if the run was not pushed and only its last half second was looked at.
         """
         return self.summary["verdict"]
 
     @property
     def provisos(self) -> tuple[str, ...]:
-        """What a verdict of ``steady`` rests on, in words: ``only friction holds it``; empty where on nothing."""
+        """What a verdict of ``steady`` depends on, in words: ``only friction holds it``; empty if on nothing."""
         return tuple(self.summary.get("stability", {}).get("provisos", ()))
 
     def quantity(self, key: str) -> pint.Quantity[float]:
         """A number of the summary with its unit, by dotted key: ``"window.oscillation_m"``, ``"energy.moved_J"``.
 
-        A number that the run did not come to, None in the summary, is NaN.
+        A number that the run did not produce, None in the summary, is NaN.
 
         Raises:
             KeyError: there is no such number; the message names the nearest.
@@ -116,9 +116,9 @@ def run(
     Args:
         scene: a loaded scene, or the path of one.
         out: directory for log, summary and scene, new or empty; when None, everything stays in memory.
-        processes: run plant, controller and logger as processes, which other terminals can watch and steer; else all
-            in this one. The bits are the same.
-        pace: simulated seconds per second, for processes; infinite for as fast as it goes.
+        processes: whether to run plant, controller and logger as processes, which other terminals can watch and steer;
+            otherwise all run in this one. The bits are the same.
+        pace: simulated seconds per second, for processes; infinite for as fast as possible.
 
     Raises:
         SceneError, ElementError: the scene cannot be run.
@@ -126,7 +126,7 @@ def run(
         PluginError: the processes could not find an element that was given as a class.
         RunFailed: a process was killed, hung or could not go on, or an element raised.
         LogError: the log could not be written.
-        TypeError: ``out`` is no path.
+        TypeError: ``out`` is not a path.
     """
     if out is not None and not isinstance(out, str | Path):
         raise TypeError(
@@ -144,7 +144,7 @@ def run(
         return Result(scene, summary, None, memory.recording())
     if processes:
         _check_files(scene)
-    # Without a directory, one that is removed once it has been read.
+    # Without ``out``, a temporary directory, which is removed once it has been read.
     with tempfile.TemporaryDirectory(prefix="haploop-") if out is None else nullcontext(out) as directory:
         target = make_output(Path(directory), scene.path)
         prepared = start.lay_out(scene.scene, dict(scene.kinds), target, scene.plugins, dict(scene.plugin_files))
@@ -155,7 +155,7 @@ def run(
 
 
 def _check_files(scene: LoadedScene) -> None:
-    """Processes load their elements themselves: every one must be installed, or have a file."""
+    """Raises PluginError unless every element is installed or has a file: processes load their elements themselves."""
     installed = registry()
     for element in elements_of(scene.scene):
         kind = element.name

@@ -1,4 +1,4 @@
-"""The files that a run has left, read back: its log, the scene that the log holds, and the summary."""
+"""Reads back the files that a run has left: its log, the scene in the log, and the summary."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from haploop.protocol.scene.scene import Scene
 def recorded_scene(
     directory: Path, attachments: Mapping[str, bytes], kinds: Mapping[str, type[Element]] | None = None
 ) -> Scene | None:
-    """Returns the scene of a run: that which its log holds, under a checksum, or else the file beside the log.
+    """Returns the scene of a run: the one that its log holds, under a checksum, or else the file beside the log.
 
     Args:
-        directory: of the run.
-        attachments: of its log.
-        kinds: the elements at hand; when None, what is not installed may stand in the scene, too.
+        directory: directory of the run.
+        attachments: attachments of its log.
+        kinds: the available elements; if None, the scene may also name what is not installed.
 
     Returns:
-        None where there is neither.
+        The scene; None if there is neither.
 
     Raises:
-        SceneError: it is no scene, or none of this version.
+        SceneError: it is not a scene, or not one of this version.
     """
     path = directory / SCENE
     if SCENE in attachments:
@@ -73,7 +73,7 @@ def recorded_log(directory: Path) -> Recording:
 
     Raises:
         FileNotFoundError: there is no log.
-        LogError: it cannot be read, or is none of a run.
+        LogError: it cannot be read, or is not the log of a run.
     """
     log = haploop.logger.read(directory)
     for topic in _COLUMNS.keys() & log.keys():
@@ -88,7 +88,7 @@ def recorded_log(directory: Path) -> Recording:
     return log
 
 
-# What is read of a summary by those that show or repeat a run: key -> type, or the same of a table within.
+# What is read from a summary to show or repeat a run: key -> type, or the same for a nested table.
 _NUMBER = (int, float, type(None))
 _PAIR = {"sampled_J": _NUMBER, "true_J": _NUMBER}
 _NEEDED: Mapping[str, Any] = {
@@ -102,10 +102,10 @@ _NEEDED: Mapping[str, Any] = {
 
 
 def recorded_summary(directory: Path) -> Summary | None:
-    """Returns the summary of a run, None where it left none.
+    """Returns the summary of a run; None if it left none.
 
     Raises:
-        LogError: it cannot be read, is damaged, or is that of something else.
+        LogError: it cannot be read, is damaged, or belongs to something else.
     """
     path = directory / SUMMARY
     if not path.exists():

@@ -1,4 +1,4 @@
-"""Stand-ins for what a run had of packages and files that are not here: they hold its numbers, and do nothing else."""
+"""Stand-ins for what a run took from packages and files that are not here: they hold its numbers, nothing else."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _OF_WALL, _OF_ESTIMATE = {"kind", "position", "stiffness", "occupies"}, {"estima
 
 @contextmanager
 def standing_in(tables: Tables) -> Iterator[None]:
-    """Lets a scene be read whose wall, estimators and hand force are not at hand, with the numbers that it gives."""
+    """Makes a scene readable whose wall, estimators and hand force are not available, with its own numbers."""
     known = all_brought()
     if (name := _missing(wall_class, wall := _table(tables, "wall"), "kind")) is not None:
         body = {"kind": name, "keys": _numbers(wall, _OF_WALL)}
@@ -51,7 +51,7 @@ def _table(tables: Tables, key: str) -> Tables:
 
 
 def _missing(find: Callable[[str], object], table: Tables, key: str) -> str | None:
-    """Returns the name at a key of a table where it is that of nothing at hand."""
+    """Returns the name at a key of a table if nothing available has this name; else None."""
     name = table.get(key)
     try:
         if isinstance(name, str):
@@ -66,7 +66,7 @@ def _numbers(table: Tables, apart: set[str]) -> dict[str, Quantity]:
 
 
 class _Wall(Wall):
-    """Pushes by nothing that is known."""
+    """Stands in for an unknown wall: its force is NaN."""
 
     def push(self, depth: Any, speed: Any) -> Any:
         return depth * float("nan")
@@ -76,7 +76,7 @@ class _Wall(Wall):
 
 
 class _Estimator(Estimator):
-    """Estimates nothing that is known."""
+    """Stands in for an unknown estimator: it estimates nothing."""
 
     does: ClassVar[str] = "that of a kind which is not here"
 
@@ -92,7 +92,7 @@ class _Estimator(Estimator):
 
 
 def elements_for(tables: Tables) -> dict[str, type[Element]]:
-    """Makes an element for each kind that a scene names and that is not installed, with the values that it gives."""
+    """Makes an element for each kind that a scene names but that is not installed, with the values that it gives."""
     given: dict[str, dict[str, list[Any]]] = {}
     for table in _elements(tables):
         values = given.setdefault(table["kind"], {})
@@ -111,7 +111,7 @@ def elements_for(tables: Tables) -> dict[str, type[Element]]:
 
 
 def _choices(values: list[Any], later: list[Any]) -> tuple[str | bool, ...]:
-    """Returns what a parameter with these values may be: no choices of a number, all texts there are of a text."""
+    """Returns the choices of a parameter with these values: none for a number, all texts that occur for a text."""
     if any(isinstance(value, bool) for value in values):
         return False, True
     if not any(isinstance(value, str) for value in values):

@@ -1,4 +1,4 @@
-"""Running a scene file: read it, make its directory, run it one way or the other, say how it went."""
+"""Runs a scene file: reads it, makes its directory, runs it one way or the other, says how it went."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ def prepare(
     *,
     any_hand: bool = False,
 ) -> RunSpec:
-    """Reads and checks everything; only when all is well is anything written.
+    """Reads and checks everything; writes only if all is well.
 
-    With ``any_hand`` the scene's may be unmodelled, which only a plant of somebody else's moves.
-    Plugins are tried in processes of their own; ``kinds`` of what is returned are stand-ins of their elements, and only
-    a file that brings more than elements is run in this process, too.
+    With ``any_hand`` the scene's hand may be unmodelled, which only a foreign plant can move.
+    Plugins are tried in processes of their own; ``kinds`` in the result holds stand-ins for their elements, and only a
+    file that brings more than elements is also run in this process.
 
     Raises:
         SceneError: the scene has mistakes.
@@ -68,7 +68,7 @@ def _with_plugins(
         for plugin, trial in trials.items():
             for kind, element in trial.wait(trial.load()).items():
                 kinds[kind], sources[kind] = element, plugin
-            if trial.brings:  # of these the checks ask the class itself
+            if trial.brings:  # for what else it brings, the checks ask the class itself
                 bring_file(plugin)
         scene = load(scene_path, overrides, kinds, any_hand=any_hand)
         elements = elements_of(scene)
@@ -81,7 +81,7 @@ def _with_plugins(
 def _with_code(spec: RunSpec) -> dict[str, type[Element]]:
     """Returns the kinds with the elements that the run's plugin files define; this process then runs the files.
 
-    Raises PluginError where one does not load.
+    Raises PluginError if one does not load.
     """
     loaded = {kind: element for file in spec.plugins for kind, element in load_plugin(file).items()}
     return spec.kinds | {kind: element for kind, element in loaded.items() if kind in spec.plugin_files}
@@ -97,7 +97,7 @@ def lay_out(
 ) -> RunSpec:
     """Puts a resolved scene and its plugin files into the directory of its run.
 
-    Raises OutputError where that fails; nothing is left in the directory, nor itself if it ``is_new``.
+    Raises OutputError if that fails; then nothing is left in the directory, nor the directory itself if it ``is_new``.
     """
     try:
         attachments = {"scene.toml": write_scene(scene, directory)}
@@ -121,12 +121,12 @@ def run(
 
     Args:
         spec: the run, as prepared.
-        in_process: everything in this process; else plant, controller and logger in one each.
-        early: such processes that have been started already, by role; they are taken out.
-        options: fields of ``RunSpec`` that take the place of those of ``spec``.
+        in_process: everything in this process; otherwise plant, controller and logger in one process each.
+        early: such processes that have already been started, by role; those used are removed.
+        options: fields of ``RunSpec`` that replace those of ``spec``.
 
     Raises:
-        NeverBegan: no program joined that somebody else was to start.
+        NeverBegan: a program that somebody else was to start did not join.
         RunFailed: a process was killed, hung or could not go on, or an element raised.
         OutputError: the run's sockets cannot be made, or its plant cannot own the time.
         LogError: the log could not be written (in one process).
@@ -144,7 +144,7 @@ def run(
         except RunFailed:
             raise
         except BaseException:
-            discard(spec.out, spec.is_new)  # where it never began
+            discard(spec.out, spec.is_new)  # if it never began
             raise
         return _judged(spec, *made)
     from haploop.launch.processes.children import heeded, interrupts
@@ -174,9 +174,9 @@ def _named(spec: RunSpec) -> str:
 
 
 def _judged(spec: RunSpec, summary: Summary, events: list[tuple[int, Event]]) -> Summary:
-    """Returns the summary of a run of processes with the verdict it asks for: it is gone through again, without books.
+    """Returns the summary of a run of processes with the verdict it asks for, from repeating the run without books.
 
-    One that is longer than ``REPEATED_S`` keeps the verdict of its window.
+    A run of foreign programs, or longer than ``REPEATED_S``, keeps the verdict of its window.
     """
     if spec.scene.run.verdict == "window":
         return summary
