@@ -1,4 +1,4 @@
-"""The word for a loop, from how its swing goes on after two pushes of different size."""
+"""The verdict on a loop, from how its swing develops after two pushes of different size."""
 
 from __future__ import annotations
 
@@ -9,35 +9,35 @@ from haploop.launch.stability.finding import STILL_1_S, Finding
 from haploop.launch.stability.swing import REST_M, SAME, Swing
 from haploop.launch.stability.traces import is_felt, smallest_felt_m
 
-# A swing that dies is watched until it is this small, or for long.
+# A dying swing is watched until it is this small, or for long.
 _SMALL_M = 20e-6
-# So much may the logarithm of the width change over the second half where a swing is said to last.
+# The most that the logarithm of the width may change over the second half for a swing that is said to last.
 _LASTING, _LASTING_LONG = 0.05, 0.02
-# One that changes by more than this, and surely, is still on its way.
+# A swing that changes by more than this, and surely, is still developing.
 _SETTLED = 0.002
-# After so long, and so many periods, a slow change counts as none, and a steady growth as one.
+# After this time, and this many periods, a slow change counts as none, and a steady growth as growth.
 _LONG_S = 8.0
 _COUNTED_PERIODS = 60.0
-# One that decays by less than this, in 1/s, would hardly be seen to, and a loop a little off might not.
+# A decay slower than this, in 1/s, would hardly be seen, and a slightly different loop might not decay.
 _DIES_1_S = 0.01
-# After so long, swings of both sizes that grow alike grow for good, and what is known not to change lasts.
+# After this time, swings of both sizes that grow alike grow for good, and a swing known not to change lasts.
 _ALIKE_S = 4.0
-# A frequency is known from so many periods on.
+# A frequency is known from this many periods on.
 _SEEN_PERIODS = 6.0
-# How a swing changes is told by so many, wherever its turns fall.
+# This many periods show how a swing changes, wherever its turns fall.
 _TELLING_PERIODS = 7.0
-# A command that ripples by less is constant, but for rounding.
+# A command that ripples by less is constant except for rounding.
 _STILL_N = 1e-9
-# Behind an encoder a swing that decays may end as a chatter of so many counts, peak to peak, at the most.
+# Behind an encoder a decaying swing may end as a chatter of at most this many counts, peak to peak.
 _COUNTS = 10
 
 
 def decide(swing: Swing, *, last: bool) -> Finding:
-    """Returns the finding; ``undecided`` asks for a longer time unless it is the ``last`` one.
+    """Returns the finding; ``undecided`` asks for a longer time unless this is the ``last`` look.
 
-    *steady*: the swing died, or dies or lasts and what is left of it no hand feels, or at the last look both swings
-    still decay alike, to a third within 100 s. *limit-cycle*: it forgets how hard it was pushed, yet remains, and is
-    felt. *growing*: both swings grow. Of swings of fewer than six periods nothing is said.
+    *steady*: the swing has died; or it dies or lasts, and no hand feels what is left of it; or at the last look both
+    swings still decay alike, to a third within 100 s. *limit-cycle*: the swing forgets how hard it was pushed, yet
+    remains, and is felt. *growing*: both swings grow. Nothing is said about swings of fewer than six periods.
     """
     if not swing.inside:
         why = "rests off the wall" if swing.moved_m < REST_M else "leaves the wall"
@@ -45,9 +45,9 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     if swing.most_m < REST_M and swing.moved_m < _SMALL_M:
         return _finding(swing, "steady", "rest" if swing.settles_s else "unmoved")
     is_long, changes = swing.watched_s >= _LONG_S, [*zip(swing.changes, swing.errors, strict=True)]
-    # Of what is too slow for its pieces all of its way counts, since they show but a part of it.
+    # If a swing is too slow for its pieces, its whole travel counts, since they show only a part of it.
     size_m = swing.width_m if swing.covers else swing.moved_m
-    # In half of a short watch even what grows quickly changes little.
+    # In half of a short watch even a quickly growing swing changes little.
     least = min(_LASTING, STILL_1_S * swing.watched_s / 2.0)
     rising = any(change > max(least, 3 * error) for change, error in changes)
     falling = max(swing.changes) < -_LASTING and (size_m < _SMALL_M or (is_long and swing.covers))
@@ -55,7 +55,7 @@ def decide(swing: Swing, *, last: bool) -> Finding:
     unfelt = swing.times_felt < 1.0 and not is_felt(swing.width_m, swing.frequency_Hz)
     seen = swing.frequency_Hz * swing.watched_s >= _SEEN_PERIODS or not is_felt(swing.moved_m, swing.frequency_Hz)
     goes_on = not (falling or size_m <= 2.0 * swing.count_m or (forgets and swing.covers))
-    # What dies behind an encoder whose counts still move may leave a chatter of them that is felt.
+    # A swing that dies behind an encoder whose counts still move may leave a chatter of counts that is felt.
     settles = falling and swing.count_m > 0.0 and swing.ripple_N > _STILL_N and not is_long
     if unfelt and seen and not (rising or goes_on or settles):
         ends = ("rest", "unfelt") if swing.settles_s else ("unmoved", "unfelt throughout")
@@ -94,7 +94,7 @@ def _finding(swing: Swing, word: str, why: str) -> Finding:
         needs_s = max(needs_s, swing.watched_s * max(2.0, 4.0 * error / max(abs(change), 1e-12)))
         if swing.rate_1_s < 0.0:
             needs_s = max(needs_s, swing.watched_s + math.log(max(swing.width_m / felt_m, 1.0)) / -swing.rate_1_s)
-    # What is left of a swing that came to rest is rounding, which swings at no frequency.
+    # What is left of a swing that came to rest is rounding, which has no frequency.
     frequency_Hz, ripple_N = (0.0, 0.0) if swing.width_m < REST_M else (swing.frequency_Hz, swing.ripple_N)
     times_felt = max(swing.times_felt, swing.width_m / felt_m)
     return Finding(

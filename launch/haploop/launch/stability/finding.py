@@ -1,4 +1,4 @@
-"""What was found of a loop that was held still and pushed: its word, and its numbers and sentence in a summary."""
+"""The finding on a loop that was held still and pushed: its verdict, and its numbers and sentence in a summary."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from haploop.launch.stability.swing import REST_M
 from haploop.launch.stability.why import AFTER_BLOW, AT_HARDEST, DECAYING, DEEPER, FRICTIONLESS, WHY
 from haploop.logger.verdict.measures import WINDOW_S
 
-# Swings of the loop and of its run whose widths differ by more than this are not the same.
+# Swings of the loop and of its run whose widths differ by more than this factor are not the same.
 _WIDER = 1.2
-# A run of more than this is asked of nobody.
+# Nobody is asked for a run longer than this.
 _LONGEST_S = 3600.0
-# A command whose ripple is more than this share of the push, a tenth of the hold, or this, is told of beside the word;
-# so is noise that moves the device by as much as a hand feels from 25 Hz on, peak to peak.
+# A command whose ripple exceeds this share of the push (a tenth of the hold), or this force, is reported beside the
+# verdict; so is noise that moves the device, peak to peak, by as much as a hand feels from 25 Hz on.
 _RIPPLES, _RIPPLES_N, _SHAKEN_M = 0.33, 0.1, 10e-6
 HAND_MOVES, NOISE = "the hand's motion", "noise"
 UNFELT, OTHER_WIDTH = "less than a hand feels", "of another width than in its run"
-# So near the least that a hand feels another length of run may give the other word.
+# This near to the least that a hand feels, a run of another length may give the other verdict.
 EDGE, _EDGE = "at the edge of what a hand feels", (0.8, 1.25)
-# A width below this is told in micrometres; what changes by less than this, in 1/s, has come to its end.
+# A width below this is given in micrometres; a swing that changes by less than this, in 1/s, has reached its end.
 _FINE_UM, STILL_1_S = 10.0, 0.05
 
-# What ``Finding.entries`` tells of the run beside the finding.
+# What ``Finding.entries`` reports about the run beside the finding.
 BESIDE = {
     "own_share": "which share of the oscillation in the run's last window the loop keeps up by itself; the rest is the "
     "hand's own motion or noise, or dies away; null where that cannot be told",
@@ -39,37 +39,37 @@ DOES = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on", "
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found of a loop whose hand is held still; a summary tells None for the sizes of what was not pushed.
+    """What was found about a loop whose hand is held still; in a summary the sizes are None if it was not pushed.
 
     Attributes:
         word: steady, limit-cycle, growing, diverged, no-contact or undecided.
         why: what was found, in short, such as ``rest`` or ``forgets``: a key of ``why.WHY``.
-        push_N: the larger of the two pushes, in magnitude; 0 of a run that diverged or ended out of contact, and was
-            not pushed.
-        watched_s: time looked at, since the push.
-        rate_1_s: the r of e^(r t) by which the steadier of the two swings grows; negative: it decays; None where it
+        push_N: the larger of the two pushes, in magnitude; 0 for a run that was not pushed because it diverged or ended
+            out of contact.
+        watched_s: time watched since the push.
+        rate_1_s: the r of e^(r t) by which the steadier of the two swings grows; negative: it decays; None if it
             died within a few pieces.
         error_1_s: standard error of ``rate_1_s``.
-        frequency_Hz: frequency of the swing that remains at the end; 0 where none does.
+        frequency_Hz: frequency of the swing that remains at the end; 0 if none does.
         width_m: width of the swing that remains, peak to peak: the mean over the last quarter of both traces.
         spread_m: half the range of ``width_m`` over the pieces and traces.
-        force_ripple_N: what the command swings by above 30 Hz, peak to peak, in the last quarter.
+        force_ripple_N: swing of the command above 30 Hz, peak to peak, in the last quarter.
         felt: whether a hand feels the swing.
-        times_felt: how many times as wide as the least that a hand feels it is; None of one that rests.
-        chaotic: whether two copies started a thousandth apart ended apart by a fifth of the swing; None if not asked.
-        detail: why the run itself ended, where it diverged, or what failed.
-        needs_s: estimate of the time after which a swing that changes too slowly is told; None otherwise.
-        most_1_s: what either swing may grow or decay by: its rate and two standard errors, of the one that may change
-            most; None where it was not watched to an answer.
-        blow_N: of a loop that rests after the push, a harder one, into the wall and off it; None if not asked.
+        times_felt: how many times as wide the swing is as the least that a hand feels; None for a loop that rests.
+        chaotic: whether two copies started a thousandth apart ended a fifth of the swing apart; None if not asked.
+        detail: why the run itself ended, if it diverged, or what failed.
+        needs_s: estimate of the time after which a swing that changes too slowly can be judged; None otherwise.
+        most_1_s: the most that either swing may grow or decay by: rate and two standard errors of the one that may
+            change most; None if it was not watched to an answer.
+        blow_N: for a loop that rests after the push, a harder push, into the wall and off it; None if not asked.
         blown: what it does after these: rests, rests off the wall, swings on, or undecided; None if not asked.
-        frictionless: what a loop that rests, too, after these would do after the push without its friction: rests,
-            swings on, swings on a part of a count deeper, or undecided; None if not asked, and of a loop without.
-        deeper_N: of a loop without friction that rests, by how much harder the hand holds it where it lies a part of an
-            encoder's count deeper; None if not asked, and without counts.
+        frictionless: what a loop that also rests after these would do after the push without its friction: rests,
+            swings on, swings on a part of a count deeper, or undecided; None if not asked, or without friction.
+        deeper_N: for a loop without friction that rests, how much harder the hand holds it where it lies a part of an
+            encoder's count deeper; None if not asked, or without counts.
         deeper: what it does there: rests, swings on, or undecided; None if not asked.
-        hardest_N: of a loop that rests then, too, the hardest hold that its hand came to; None if that was about the
-            last one, or the hand stays.
+        hardest_N: for a loop that rests then too, the hardest hold that its hand reached; None if that was about the
+            last one, or if the hand does not move.
         at_hardest: what it does there: rests, swings on, or undecided; None if not asked.
         without: of a loop that swings, what it does without its ``delay``, with a much finer ``encoder``, without its
             ``elements``, and without ``all`` of these where it swings on without any: rests, swings on, or undecided;
@@ -130,9 +130,9 @@ class Finding:
         return self.word == "steady" and self.frictionless in (None, "rests")
 
     def held_deeper(self, more_N: float, found: Finding) -> Finding:
-        """Returns the finding of a loop that rests with what was found a part of a count deeper, without friction.
+        """Returns the finding of a loop that rests, with what was found a part of a count deeper, without friction.
 
-        One that has none is undecided unless it rests there, too.
+        A loop that has no friction is undecided unless it rests there too.
         """
         does = DOES.get(found.word, "undecided")
         if self.frictionless:
@@ -148,12 +148,12 @@ class Finding:
     def entries(
         self, seen_m: float | None = None, beside: Sequence[str] = (), ripple_N: float | None = None
     ) -> dict[str, Any]:
-        """Returns what a summary tells of it: the word, why as a sentence, and the numbers as its ``stability``.
+        """Returns its entries in a summary: the verdict, the reason as a sentence, and the numbers as ``stability``.
 
         Args:
             seen_m: how far the run itself swung at its end, peak to peak.
             beside: what else moved the run there, see ``moved_beside``.
-            ripple_N: what its command swung by above 30 Hz there, peak to peak.
+            ripple_N: swing of its command above 30 Hz there, peak to peak.
         """
         numbers = {name: value for name, value in vars(self).items() if name not in ("word", "detail")}
         if not self.push_N:
@@ -165,7 +165,7 @@ class Finding:
         return {"verdict": self.word, "verdict_rule": self.sentence(), "stability": numbers}
 
     def _provisos(self, seen_m: float | None, beside: Sequence[str], ripple_N: float | None) -> list[str]:
-        """Returns what has to be said in the same breath as ``steady``, or as a swing that lasts."""
+        """Returns what has to be said in the same breath as ``steady``, or as a lasting swing."""
         edge = [EDGE] * (self.times_felt is not None and _EDGE[0] < self.times_felt < _EDGE[1])
         if self.word == "limit-cycle":
             unlike = [OTHER_WIDTH] * (not beside and self._is_other(seen_m))
@@ -182,17 +182,17 @@ class Finding:
         return told if self.word == "steady" else []
 
     def _is_other(self, seen_m: float | None) -> bool:
-        """Tells whether the run's swing is wider or narrower than that after the push, beyond what both vary by."""
+        """Tells whether the run's swing is wider or narrower than that after the push, by more than both vary."""
         if not seen_m or self.chaotic or self.frequency_Hz * WINDOW_S < 1.0:
             return False
         most_m, least_m = self.width_m + 2.0 * self.spread_m, self.width_m - 2.0 * self.spread_m
         return not least_m / _WIDER <= seen_m <= most_m * _WIDER
 
     def own_share(self, seen_m: float | None) -> float | None:
-        """Returns which share of the swing seen in the run the loop keeps up by itself, with a still hand and no noise.
+        """Returns the share of the swing seen in the run that the loop sustains alone, with a still hand and no noise.
 
-        What is left is the hand's own motion, the noise, or dies away. None where it cannot be told: of a loop that
-        does not settle, of a run that did not swing, and where the loop swings wider than the run did.
+        The rest is the hand's own motion, the noise, or dies away. None if the share is unknown: for a loop that does
+        not settle, for a run that did not swing, and if the loop swings wider than the run did.
         """
         if self.word not in ("steady", "limit-cycle") or not seen_m or seen_m < REST_M:
             return None
@@ -200,12 +200,12 @@ class Finding:
         return min(own_m / seen_m, 1.0) if own_m < _WIDER * seen_m else None
 
     def _decaying(self) -> str:
-        """Returns whether what is left becomes less yet, beyond three standard errors; "" where it does not."""
+        """Returns words on whether what is left still decays, by more than three standard errors; "" if it does not."""
         rate_1_s, error_1_s = self.rate_1_s or 0.0, self.error_1_s or 0.0
         return DECAYING.format(-rate_1_s, error_1_s) if rate_1_s < -max(3.0 * error_1_s, STILL_1_S) else ""
 
     def sentence(self) -> str:
-        """Returns why, with its numbers."""
+        """Returns the reason for the verdict, a sentence with its numbers."""
         numbers = {name: math.nan if value is None else value for name, value in vars(self).items()}
         width_um = 1e6 * self.width_m
         width = f"{1e-3 * width_um:.3g} mm" if width_um >= _FINE_UM else f"{width_um:.3g} µm"

@@ -1,4 +1,4 @@
-"""Judging the end of a run: the loop is held still, pushed, and watched until it tells."""
+"""Judges the end of a run: the loop is held still, pushed, and watched until there is a verdict."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def judge_scene(
 
     Args:
         scene: the resolved scene.
-        kinds: element kinds at hand.
+        kinds: available element kinds.
         events: (tick, event) in order; the scene's own when None.
         looks_s: times since the push at which the loop is looked at until it tells.
         blows: what one that rests is struck with, as shares of its push.
@@ -77,7 +77,7 @@ def end_of(
     events: Sequence[tuple[int, Event]] | None = None,
     on_exchange: Callable[[], object] = lambda: None,
 ) -> End | Finding:
-    """Returns the end of a run, or what is found of one that diverged or ended out of contact."""
+    """Returns the end of a run, or the finding on one that diverged or ended out of contact."""
     time = Timebase.from_scene(scene)
     plant, controller, ticks = Plant(scene, time), Controller(scene, time, dict(kinds)), time.ticks
     for tick, event in scene_events(scene, time) if events is None else events:
@@ -112,9 +112,9 @@ def end_at(
 
     Args:
         scene: what was run.
-        plant, controller: as they stand there.
+        plant, controller: in their state at the end.
         inside: whether each of the last ticks was in contact, shape (ticks,).
-        on_exchange: called whenever a plant that goes on from there asks for commands.
+        on_exchange: called whenever a plant that continues from there asks for commands.
     """
     if plant.stop_reason:
         return Finding("diverged", "diverged", detail=plant.stop_reason)
@@ -125,7 +125,7 @@ def end_at(
 
 
 def is_watched(scene: Scene, summary: Summary) -> bool:
-    """Tells whether a run is judged by pushing it: its scene asks for that, and it came to an end by itself."""
+    """Tells whether a run is judged by pushing it: its scene asks for that, and it came to its end in order."""
     return scene.run.verdict == "pushed" and summary["ended"] in ("done", "stopped") and summary["ticks"] > 0
 
 
@@ -133,10 +133,10 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
     """Returns the summary of a run with the verdict that its scene asks for, and writes it into the run's directory.
 
     Args:
-        find: returns what is found of the end of the run; not called where it failed, diverged, or kept off the wall.
+        find: returns the finding on the end of the run; not called if the run failed, diverged, or kept off the wall.
 
     Raises:
-        LogError: it could not be written.
+        LogError: the summary could not be written.
     """
     if is_watched(scene, summary):
         untouched = summary["verdict"] == "no-contact"
@@ -156,15 +156,15 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
 def judge(
     end: End, looks_s: Sequence[float] = PATIENT_S, *, blows: Sequence[float] = BLOWS, thorough: bool = False
 ) -> Finding:
-    """Returns whether a loop forgets its start, from the end of a run in contact on.
+    """Returns whether a loop, continued from the end of a run in contact, forgets its start.
 
     The hand is held still with the mean force of its last contacts, noise is switched off, and two copies of the loop
-    are pushed, one ten times as hard as the other. Whatever moves a second later is the loop's own. Most loops tell
-    within a second or two; slow ones are watched to the last look. It takes as long as simulating that time twice. One
-    that comes to rest is struck, too, into the wall and off it, which takes as long again. Friction stops small
-    swings of an unstable loop, but wide ones not: where somebody asks, what rests is pushed without it as well, and
-    what rests without friction also where it lies a third and two thirds of an encoder's count deeper. A loop that
-    rests at the last hold of a hand that moves is judged at its hardest hold, too.
+    are pushed, one ten times as hard as the other. Any motion a second later is the loop's own. Most loops show their
+    verdict within a second or two; slow ones are watched to the last look. This takes as long as simulating that time
+    twice. A loop that comes to rest is also struck, into the wall and off it, which takes as long again. Friction stops
+    small swings of an unstable loop, but not wide ones: if ``thorough``, a loop that rests is also pushed without its
+    friction, and one that rests without friction also where it lies a third and two thirds of an encoder's count
+    deeper. A loop that rests at the last hold of a moving hand is also judged at that hand's hardest hold.
     """
     push_N = push_of(end.hold_N, end.scene.hand, end.wall_m)
     pushes_N = push_N * SMALLER, push_N
@@ -185,7 +185,7 @@ def judge(
 
 
 def _elsewhere(end: End, pushes_N: tuple[float, ...], found: Finding) -> Finding:
-    """Returns the finding of a loop that rests with what it does without its friction, and elsewhere within a count."""
+    """Returns the finding of a loop that rests, with what it does without its friction and elsewhere within a count."""
     if end.scene.friction:
         rubs, end = has_friction(end.scene), replace(end, scene=replace(end.scene, friction=Friction(kinetic=0.0)))
         found = found.without_friction(watch(end, pushes_N, LOOKS_S)[0]) if rubs else found

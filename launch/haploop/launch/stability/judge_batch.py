@@ -1,4 +1,4 @@
-"""``judge`` of many: the members of a batch are pushed and watched together."""
+"""``judge`` for many loops: the members of a batch are pushed and watched together."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ from haploop.protocol.scene.effects import Friction
 from haploop.protocol.trees import tree_member, tree_take
 from haploop.protocol.walls.wall import Wall
 
-# Members of a batch that are judged together.
+# The most members of a batch that are judged together.
 MOST = 1024
 
 
 def judge_batch(end: BatchEnd, looks_s: Sequence[float] = LOOKS_S) -> list[Finding]:
-    """Returns what ``judge`` finds of each member at the end of a batch, two members at least.
+    """Returns the finding of ``judge`` on each member at the end of a batch, which has at least two.
 
     Raises:
         ElementError: an element raised; it is not known for which member.
@@ -81,7 +81,7 @@ def _harder(end: BatchEnd, member: int, hold_N: float) -> float | None:
 
 
 def _elsewhere(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, found: list[Finding]) -> list[Finding]:
-    """Returns the findings; of each loop that rests, with what it does without its friction, and within a count."""
+    """Returns the findings; for each loop that rests, with what it does without its friction and within a count."""
     found, rests = list(found), [place for place, each in enumerate(found) if is_struck(each)]
     if rests and end.scenes[0].friction:
         held = {place: float(hold_N[place]) for place in rests if has_friction(end.scenes[members[place]])}
@@ -101,7 +101,7 @@ def _deeper(end: BatchEnd, member: int, hold_N: float) -> list[float]:
 
 
 def _pushed(end: BatchEnd, members: np.ndarray, holds_N: dict[int, float]) -> dict[int, Finding]:
-    """Returns what is found at holds of some places after both pushes, by place."""
+    """Returns the findings after both pushes at the holds of some places, by place."""
     if not holds_N:
         return {}
     some, hold_N = members[[*holds_N]], np.array([*holds_N.values()])
@@ -113,10 +113,10 @@ def _watched(
     end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, push_N: np.ndarray, shares: tuple[float, ...],
     looks_s: Sequence[float],
 ) -> tuple[list[Finding], list[tuple[int, np.ndarray]]]:  # fmt: skip
-    """Watches copies for each share of the pushes, the hardest last; copy ``i + n count`` is of member i and share n.
+    """Watches copies for each share of the pushes, the hardest last; copy ``i + n count`` has member i and share n.
 
     Returns:
-        What is found of each, and (its place, the last copy's positions) of every limit cycle.
+        The finding on each member, and (its place, the last copy's positions) for every limit cycle.
     """
     count = len(members)
     found = [failed(push, 0.0, "") for push in push_N.tolist()]
@@ -158,7 +158,7 @@ def _with_chaos(
     end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, push_N: np.ndarray, found: list[Finding],
     asked: Sequence[tuple[int, np.ndarray]],
 ) -> list[Finding]:  # fmt: skip
-    """Returns the findings; of each limit cycle, given by its place and large trace, also whether it is chaotic."""
+    """Returns the findings; for each limit cycle, given by its place and large trace, also whether it is chaotic."""
     for watched_s in sorted({found[place].watched_s for place, _ in asked}):
         some = [(place, x) for place, x in asked if found[place].watched_s == watched_s]
         places = np.array([place for place, _ in some])
@@ -177,5 +177,5 @@ def _wall_m(end: BatchEnd, member: int) -> float:
 
 
 def _wall_of(end: BatchEnd, place: int | np.ndarray) -> Wall:
-    """Returns the wall of a member, or of some."""
+    """Returns the wall of a member, or of several."""
     return tree_take(end.params.wall, np.atleast_1d(place))

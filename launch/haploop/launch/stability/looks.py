@@ -1,4 +1,4 @@
-"""The pushes, the times of looking and the finding of a look, common to judging one loop and many."""
+"""The pushes, the times of the looks and the finding of a look, shared by the judging of one loop and of many."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from haploop.protocol.scene.scene import Hand, Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.walls.wall import Wall
 
-# The larger push, as a share of what the hand holds the wall with, and the smaller one, as a share of it.
+# The larger push as a share of the force that the hand holds the wall with; the smaller one as a share of the larger.
 PUSH, SMALLER = 0.3, 0.1
-# Blows, as a share of the larger push: three times what the hand holds the wall with, into it and off it.
+# Blows, as multiples of the larger push: three times the force that the hand holds the wall with, into it and off it.
 BLOWS = (10.0, -10.0)
-# Times since the push at which the loop is looked at, in s: of a run as part of it, and where somebody asks.
+# Times since the push at which the loop is looked at, in s: as part of a run, and if somebody asks.
 LOOKS_S = (1.0, 2.0, 4.0, 8.0, 16.0)
 PATIENT_S = (*LOOKS_S, 32.0, 64.0)
-# A loop is watched for so many ticks at least.
+# A loop is watched for at least this many ticks.
 _LEAST_TICKS = 240
-# A third copy, pushed harder by this share, shows whether the swing is chaotic: whether it ends apart from the second
-# by this share of the width.
+# A third copy, pushed harder by this share, shows whether the swing is chaotic: whether that copy ends apart from the
+# second by this share of the width.
 BESIDE, _APART = 1e-3, 0.2
 _LINEAR = ("damping", "bidirectional-inertia")
 
 
 def watch_times(time: Timebase, delay_steps: int, looks_s: Sequence[float]) -> list[float]:
-    """Returns when to look, s: not before what is commanded has gone round eight times, and at ticks enough to tell."""
+    """Returns when to look, s: not before a command has gone round eight times, and after enough ticks to tell."""
     least_s = max(8.0 * delay_steps / time.plant_rate, _LEAST_TICKS / time.control_rate)
     return sorted({max(least_s, look_s) for look_s in looks_s})
 
@@ -39,7 +39,7 @@ def watch_times(time: Timebase, delay_steps: int, looks_s: Sequence[float]) -> l
 def parts(one: np.ndarray, other: np.ndarray, width_m: float) -> bool:
     """Tells whether two copies that began together end apart by a fifth of their swing or more.
 
-    One that is shorter left the limit, and has parted.
+    A copy that is shorter has left the limit, and so has parted.
     """
     if len(one) != len(other):
         return True
@@ -49,22 +49,22 @@ def parts(one: np.ndarray, other: np.ndarray, width_m: float) -> bool:
 
 
 def push_of(hold_N: float, hand: Hand | None, wall_m: float) -> float:
-    """Returns the larger push of a loop whose hand is held at a force against a wall at a position, N."""
+    """Returns the larger push, N, for a loop whose hand is held at a force against a wall at a position."""
     press_N = press_of(hold_N, hand, wall_m)
     return PUSH * max(abs(press_N), LEAST_PRESS_N) * (1.0 if press_N > 0.0 else -1.0)
 
 
 def is_struck(found: Finding) -> bool:
-    """Tells whether a loop is struck as well, since what rests after a push may swing on after a blow.
+    """Tells whether a loop is also struck, since a loop that rests after a push may swing on after a blow.
 
-    Friction holds a swing that is small; an actuator that saturates gives way to one that is wide, as an element that
-    switches does, and off the wall there is none of it.
+    Friction holds a small swing; a saturating actuator gives way to a wide one, as a switching element does, and off
+    the wall there is none of it.
     """
     return found.word == "steady" and found.why != "decays"
 
 
 def moved_beside(scene: Scene, from_s: float) -> list[str]:
-    """Returns what moves a run beside its loop after a time in s: hand, noise, both, or none."""
+    """Returns what moves a run besides its loop after a time in s: hand, noise, both, or nothing."""
     still = constant_from_s(scene.hand.force if scene.hand else None) <= from_s
     is_noisy = scene.noise is not None or (scene.accelerometer is not None and scene.accelerometer.noise_density > 0.0)
     unmodelled = scene.hand is not None and scene.hand.kind == "unmodelled"
@@ -76,14 +76,14 @@ def failed(push_N: float, seconds: float, detail: str) -> Finding:
 
 
 def left_limit(push_N: float, seconds: float, wall: Wall, x: np.ndarray) -> Finding:
-    """Returns what is found of a loop of which a copy left the limit, at whose ticks it was at x (m)."""
+    """Returns the finding on a loop of which a copy left the limit; x is the position of the copy at its ticks, m."""
     if not _is_inside(wall, x[None, len(x) // 2 :])[0]:
         return Finding("undecided", "leaves the wall", abs(push_N))
     return Finding("growing", "leaves the limit", abs(push_N), seconds)
 
 
 def _is_inside(wall: Wall, x: np.ndarray, reduce: Callable[..., np.ndarray] = np.any) -> np.ndarray:
-    """Tells which loops touched their wall at any (or all) of the ticks where they were at x (m), (loops, ticks)."""
+    """Tells which loops touched their wall at any (or all) of their ticks; x: position, m, shape (loops, ticks)."""
     position = np.reshape(wall.position, (-1, 1))
     return reduce(wall.inward * (x - position) > 0.0, axis=1)
 
@@ -91,7 +91,7 @@ def _is_inside(wall: Wall, x: np.ndarray, reduce: Callable[..., np.ndarray] = np
 def findings(
     traces: list[np.ndarray], time: Timebase, wall: Wall, scenes: Sequence[Scene], push_N: np.ndarray, *, last: bool
 ) -> list[Finding]:
-    """Returns what is found so far, of traces of position after both pushes and of the command, (loops, ticks)."""
+    """Returns the findings so far, from traces of position after both pushes and of the command, (loops, ticks)."""
     small, large, command = traces
     quarter = -(-large.shape[1] // 4)
     half = large.shape[1] // 2
@@ -112,7 +112,7 @@ def has_friction(scene: Scene) -> bool:
 def is_smooth(scene: Scene) -> bool:
     """Tells whether nothing but the encoder rounds, nothing saturates, and no estimator filters small swings more.
 
-    Nor may an element behind an encoder be other than linear: one count may switch all of its force on.
+    Nor may an element behind an encoder be nonlinear: one count may switch on all of its force.
     """
     limits = [
         (table.resolution, getattr(table, "saturation", None))

@@ -1,4 +1,4 @@
-"""Drift of what elements remember while their loop is watched, after which they may act otherwise."""
+"""Drift of what elements remember while their loop is watched, after which they may act differently."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from haploop.controller.asked import ENERGIES, Told
 from haploop.controller.controller import Controller
 from haploop.protocol.trees import tree_leaves
 
-# Memory is looked at so often in the time from one look at the loop to the next.
+# How many times memory is looked at between one look at the loop and the next.
 _LOOKED_AT = 64
-# A memory that changes by a smaller share of itself in half the time watched is said to stay.
+# A memory that changes by less than this share of itself in half the time watched is said to stay.
 _STAYS = 1e-3
-# A change counts from so many standard errors on where a loop is watched for longer, and where that is the last look.
+# Standard errors from which on a change counts: if the loop is watched for longer, and if this is the last look.
 _ERRORS, _ERRORS_AT_LAST = 1.0, 4.0
-# Of less than this a swing of the loop's own hides a change.
+# For less than this time a swing of the loop's own hides a change.
 _LEAST_S = 4.0
 
 
@@ -27,9 +27,9 @@ def look_ticks(first: int, end: int) -> list[int]:
 
 
 def memory_of(controller: Controller, loops: int | None = None) -> np.ndarray:
-    """Returns all numbers that the elements of a controller remember, shape (numbers,), or (numbers, loops) of a batch.
+    """Returns all numbers that the elements of a controller remember, shape (numbers,), or (numbers, loops) in a batch.
 
-    They are those of the declared memories, the energies that an element asks for, and attributes that one keeps.
+    They are the declared memories, the energies that an element asks for, and the attributes that an element keeps.
     """
     remembered: list[Any] = []
     *_, memories = controller.state or ((),)
@@ -51,11 +51,11 @@ def _is_number(value: Any) -> bool:
 
 
 def may_act(looks: Sequence[np.ndarray], swings: bool, watched_s: float, *, last: bool) -> np.ndarray:
-    """Tells of which loops that rest an element may yet come to act otherwise, as what it remembers goes on changing.
+    """Tells in which resting loops an element may yet act differently, as what it remembers keeps changing.
 
     Args:
         looks: see ``drifts``.
-        swings: whether a swing is left that nobody feels, which may hide a change for a few seconds.
+        swings: whether an unfelt swing is left, which may hide a change for a few seconds.
         watched_s: time since the push.
         last: whether the loop is not watched for longer.
     """
@@ -65,14 +65,14 @@ def may_act(looks: Sequence[np.ndarray], swings: bool, watched_s: float, *, last
 
 
 def drifts(looks: Sequence[np.ndarray], errors: float = _ERRORS_AT_LAST) -> np.ndarray:
-    """Tells of which loops a number that an element remembers goes on changing one way.
+    """Tells in which loops a number that an element remembers keeps changing in one direction.
 
-    The looks are cut into four: the means of the quarters rise, or fall, from each to the next, at the end by as much
-    as half of what they did at first, and in all by more than they are uncertain. So does the energy that a passivity
-    observer has in store while a small swing draws on it (Hannaford and Ryu 2002), and it acts when that is used up.
+    The looks are cut into four: the means of the quarters rise, or fall, from each to the next, at the end by at least
+    half as much as at first, and in all by more than their uncertainty. So does the energy that a passivity observer
+    has in store while a small swing draws on it (Hannaford and Ryu 2002); it acts when that energy is used up.
 
     Args:
-        looks: at equal times, from half the time watched on, shape (numbers, ...) each; of less than 8 nothing is said.
+        looks: at equal times from half the time watched on, shape (numbers, ...) each; of fewer than 8 nothing is said.
         errors: standard errors from which on a change counts.
 
     Returns:

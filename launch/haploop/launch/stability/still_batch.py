@@ -1,4 +1,4 @@
-"""``StillHand`` of many: pushed copies of the members of a batch, in arrays."""
+"""``StillHand`` for many loops: pushed copies of the members of a batch, in arrays."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from haploop.plant.choose import make_motion
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.trees import tree_select, tree_take
 
-# An operand that all copies share is copied into buffers of NumPy's unless these are shorter than a row of copies.
+# NumPy copies an operand that all copies share into its buffers unless these are shorter than a row of copies.
 _BUFFER = 512
-# Records are dropped once in so many ticks.
+# Records are dropped once in this many ticks.
 _FORGET_TICKS = 256
-# Copies that have left the limit are computed on, unheeded, until they are more than this share.
+# Copies that have left the limit are still computed, but ignored, until they are more than this share.
 _UNHEEDED = 0.25
 
 
 class StillBatch(BatchLoop):
-    """Copies of members of a batch that go on with still hands; the batch itself is not touched.
+    """Copies of members of a batch that continue with still hands; the batch itself is not touched.
 
     Args:
-        end: where they go on from.
+        end: where they continue from.
         member: place of each copy among the members of ``end``, shape (copies,).
-        hold_N, push_N: force at which each hand is held, and what is added to it in the push, shape (copies,).
+        hold_N, push_N: force at which each hand is held, and force added to it in the push, shape (copies,).
 
     Attributes:
-        copy: number of each of the copies that are still there, shape (those there,).
+        copy: numbers of the copies that are still there, shape (those there,).
     """
 
     def __init__(self, end: BatchEnd, member: np.ndarray, hold_N: np.ndarray, push_N: np.ndarray) -> None:
@@ -59,16 +59,16 @@ class StillBatch(BatchLoop):
         self._gone = np.zeros(len(member), bool)
 
     def go_to(self, seconds: float) -> list[tuple[int, np.ndarray]]:
-        """Goes on until so many seconds have passed since the push; what leaves the limit on the way is dropped.
+        """Continues until so many seconds have passed since the push; drops copies that leave the limit on the way.
 
         Returns:
-            (number of the copy, its positions at the ticks so far) of each that left the limit, in order.
+            (number of the copy, its positions at the ticks so far) for each that left the limit, in order.
 
         Raises:
             ElementError: an element raised.
         """
         left: list[tuple[int, np.ndarray]] = []
-        with np.errstate(all="ignore"):  # which gives back the buffers as well
+        with np.errstate(all="ignore"):  # which also restores the buffers
             np.setbufsize(_BUFFER)
             if self._tick < self._first:
                 left += self._go_until(self._first)
@@ -130,7 +130,7 @@ class StillBatch(BatchLoop):
             return
         self._traces, self.copy, self._gone = self._traces[..., kept], self.copy[kept], self._gone[kept]
         self._memory = [(ticks, numbers[:, kept]) for ticks, numbers in self._memory]
-        if len(self.copy):  # arrays of none would be taken for those that all share
+        if len(self.copy):  # empty arrays would be taken for shared ones
             self._select(kept)
             self._limit_m, self._then = tree_select((self._limit_m, self._then), kept)
 

@@ -1,4 +1,4 @@
-"""The loop as it goes on from the end of a run, its hand held still but for one push, without noise or events."""
+"""The loop continued from the end of a run, its hand held still except for one push, without noise or events."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from haploop.protocol.walls.wall import Wall
 
 # A push lasts this long.
 PUSH_S = 0.05
-# A force of the hand is a hold where it lasts so long; of a run that many seconds at its end are looked through.
+# A force of the hand is a hold if it lasts this long; only this many seconds at the end of a run are searched.
 _HOLD_S, _LATEST_S = 0.25, 60.0
-# A hold that is harder by less than this is the same.
+# A hold that is harder by less than this factor is the same.
 _HARDER = 1.2
-# A hand that presses by less holds nothing.
+# A hand that presses with less holds nothing.
 LEAST_PRESS_N = 1e-3
-# So much of an encoder's count deeper a loop is held that rests.
+# Parts of an encoder's count by which a loop that rests is held deeper.
 _DEEPER = (1.0 / 3.0, 2.0 / 3.0)
 
 
@@ -35,10 +35,10 @@ class End:
     """The end of a run.
 
     Attributes:
-        scene, time: what was run, and its integers.
-        plant, controller: as they stand there, their blocks taken.
+        scene, time: what was run, and its timebase.
+        plant, controller: in their state at the end, with their blocks taken.
         hold_N: the force at which the hand is held from there on.
-        on_exchange: called whenever a plant that goes on from there asks for commands.
+        on_exchange: called whenever a plant that continues from there asks for commands.
     """
 
     scene: Scene
@@ -55,11 +55,11 @@ class End:
 
 
 class StillHand:
-    """A loop that goes on with a still hand; the run itself is not touched.
+    """A loop that continues with a still hand; the run itself is not touched.
 
     Args:
-        end: where it goes on from.
-        push_N: force of the push, added to the hand's.
+        end: where it continues from.
+        push_N: force of the push, added to that of the hand.
 
     Attributes:
         x: position at the ticks since the push, m.
@@ -82,7 +82,7 @@ class StillHand:
         return self._plant.stop_reason
 
     def go_to(self, seconds: float) -> None:
-        """Goes on until so many seconds have passed since the push.
+        """Continues until so many seconds have passed since the push.
 
         Raises:
             ElementError: an element raised.
@@ -120,7 +120,7 @@ class StillHand:
 
 
 def push_ticks(rate: int) -> int:
-    """Returns how many ticks a push lasts at so many ticks a second, one at least."""
+    """Returns how many ticks a push lasts at ``rate`` ticks a second, at least one."""
     return max(1, round(PUSH_S * rate))
 
 
@@ -149,17 +149,18 @@ def hold_of(scene: Scene, time: Timebase, last: int, inside: np.ndarray) -> floa
 
 
 def press_of(hold_N: float, hand: Hand | None, wall_m: float) -> float:
-    """Returns by how much a hand held at a force presses, N: with its spring at the wall, where that presses more."""
+    """Returns the force that a hand held at a force presses with, N: with its spring at the wall if that is more."""
     with_spring_N = hold_N + hand.stiffness * (hand.rest - wall_m) if hand else hold_N
     return max(hold_N, with_spring_N, key=abs)
 
 
 def deeper_holds(scene: Scene, wall: Wall, hold_N: float) -> list[float]:
-    """Returns holds by which the device rests a third and two thirds of an encoder's count deeper, N; none without one.
+    """Returns holds at which the device rests a third and two thirds of an encoder's count deeper, N; none without one.
 
-    What a wall answers behind an encoder hangs on where within a count the device rests: a loop that rests at one hold
-    may chatter at the next. The force that is missing is that of wall and hand on the way, at most V'(p + q) - V'(p)
-    and k q, where V'(p) is what the hand presses with, q the count and k the stiffness of the hand through its grip.
+    The response of a wall behind an encoder depends on where within a count the device rests: a loop that rests at one
+    hold may chatter at the next. The missing force is that of wall and hand on the way, at most V'(p + q) - V'(p) and
+    k q, where V'(p) is the force that the hand presses with, q the count and k the stiffness of the hand through its
+    grip.
     """
     press_N = press_of(hold_N, scene.hand, wall.position)
     if scene.encoder is None or not wall.inward:
@@ -170,7 +171,7 @@ def deeper_holds(scene: Scene, wall: Wall, hold_N: float) -> list[float]:
 
 
 def _depth_of(wall: Wall, press_N: float) -> float:
-    """Returns the depth, m, at which a wall answers a press; that of a metre where it answers with less."""
+    """Returns the depth, m, at which a wall balances a press; one metre if it answers with less there."""
     low, high = 0.0, 1.0
     for _ in range(60):
         middle = (low + high) / 2.0
@@ -186,10 +187,10 @@ def _stiffness_of(hand: Hand | None) -> float:
 
 
 def harder_hold(scene: Scene, time: Timebase, last: int, hold_N: float, wall_m: float) -> float | None:
-    """Returns the hardest hold in N of a hand that moves, before tick ``last``; None where ``hold_N`` is about that.
+    """Returns the hardest hold in N of a moving hand, before tick ``last``; None if ``hold_N`` is about as hard.
 
-    The wall is at ``wall_m``. It is the largest mean over a quarter of a second: a hand that trembles faster holds what
-    it does on average.
+    The wall is at ``wall_m``. The hold is the largest mean over a quarter of a second: a hand that trembles faster
+    holds with its average force.
     """
     table = scene.hand.force if scene.hand else None
     if math.isfinite(constant_from_s(table)):

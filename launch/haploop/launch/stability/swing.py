@@ -13,19 +13,19 @@ from haploop.launch.stability.traces import frequency_Hz, level_widths, most_fel
 from haploop.launch.stability.turns import turns_of
 from haploop.logger.verdict.ripple import RIPPLE_ABOVE_HZ, above, ripple
 
-# Pieces in which the width of a swing is measured, and the periods that one covers at least.
+# Pieces in which the width of a swing is measured, and the fewest periods that a piece covers.
 _PIECES, _FEW_PIECES = 24, 8
 _LEAST_PERIODS = 2.0
-# What the place where pieces begin in a period makes of the change of the logarithm of the width, times the eighth
-# power of the periods that a piece covers (found with sines); at least and at most.
+# Effect of where in a period the pieces begin on the change of the logarithm of the width, times the eighth power of
+# the periods that a piece covers (found with sines); its smallest and largest value.
 _PHASE, _UNSURE = 6.0, (1e-4, 1.0)
 # A swing this small is rounding: a thousand atoms would be wider.
 REST_M = 1e-9
-# A slow swing within this many counts of the encoder, or this wide, is no motion that could make a fast one.
+# A slow swing within this many counts of the encoder, or this wide, is not a motion that could cause a fast one.
 _CREEP, _CREEP_M = 3.0, 20e-6
-# A swing has settled that is no larger than this share of its way.
+# A swing has settled once it is no larger than this share of its travel.
 _SETTLED = 0.05
-# Sizes whose ratio lies between these are the same; those of the pushes differ by ten.
+# Sizes whose ratio lies between these are the same; those of the pushes differ by a factor of ten.
 SAME = (0.7, 1.43)
 
 
@@ -36,10 +36,10 @@ class Pushed(NamedTuple):
         small, large: position at the ticks after the smaller and the larger push, shape (members, ticks), m.
         command: command at the ticks after the larger one, shape (members, ticks), N.
         push_N: the larger push, shape (members,).
-        count_m: one count of the encoder, shape (members,); 0 without.
+        count_m: one count of the encoder, shape (members,); 0 without an encoder.
         inside: whether a tick in the last quarter of both was in contact, shape (members,).
-        stays_inside: whether all ticks in the last half of both were.
-        smooth: whether the loop treats small swings as large ones, but for the counts of its encoder, shape (members,).
+        stays_inside: whether all ticks in the last half of both were in contact, shape (members,).
+        smooth: whether the loop treats small swings like large ones, except for its encoder counts, shape (members,).
     """
 
     small: np.ndarray
@@ -58,18 +58,19 @@ class Swing(NamedTuple):
     Attributes:
         watched_s: time since the push.
         push_N, count_m, inside, stays_inside, smooth: as in ``Pushed``.
-        changes, errors: of the logarithm of the width over the second half, small and large, and their standard errors.
-        rate_1_s, error_1_s: growth of the one that changes less, and its standard error.
+        changes, errors: changes of the logarithm of the width over the second half, after the small and the large push,
+            and their standard errors.
+        rate_1_s, error_1_s: growth of the swing that changes less, and its standard error.
         width_m, most_m: mean and maximum of the widths in the last quarter of both.
-        told_m, spread_m: mean and half range of the widths there, about level trends of two pieces: what is told.
-        moved_m: peak to peak over the last half of either, with its trend.
-        at_first, at_last: width after the larger push over that after the smaller, in the first piece and at the last.
-        frequency_Hz: of the end.
-        ripple_N: what the command swings by above 30 Hz after the larger push, peak to peak, in the last quarter.
-        covers: whether a piece covers periods enough to tell how the swing changes, or its turns tell.
-        times_felt: how strong the last quarter of either is, in terms of what is felt.
-        settles_s: time after the larger push from which on it stays within 5 % of its way, or within what remains; 0 of
-            one that did not move.
+        told_m, spread_m: mean and half range of the widths there, about level trends of two pieces: what is reported.
+        moved_m: motion of either over the last half, peak to peak, including its trend.
+        at_first, at_last: width after the larger push over that after the smaller, in the first piece and at the end.
+        frequency_Hz: frequency at the end.
+        ripple_N: swing of the command above 30 Hz after the larger push, peak to peak, in the last quarter.
+        covers: whether a piece covers enough periods to show how the swing changes, or its turns show it.
+        times_felt: how strong the last quarter of either is, as a multiple of what is felt.
+        settles_s: time after the larger push from which on the swing stays within 5 % of its travel, or within what
+            remains; 0 if it did not move.
     """
 
     watched_s: float
@@ -96,22 +97,22 @@ class Swing(NamedTuple):
     settles_s: float
 
     def lasts(self, within: float) -> bool:
-        """Tells whether both swings neither grow nor decay, as far as their scatter lets one say."""
+        """Tells whether both swings neither grow nor decay, as far as their scatter shows."""
         pairs = zip(self.changes, self.errors, strict=True)
         return all(abs(change) < max(within, 2 * error) and error < 0.1 for change, error in pairs)
 
     def is_alike(self) -> bool:
-        """Tells whether swings of other sizes go as these: never off the wall, or the larger as the smaller one."""
+        """Tells whether swings of other sizes go like these: never off the wall, or the larger like the smaller one."""
         rate = abs(self.changes[1] - self.changes[0]) < 0.1 * abs(self.changes[1]) + 3 * math.hypot(*self.errors)
         kept_ratio = self.at_first > 2.0 and SAME[0] < self.at_last / self.at_first < SAME[1]
         return rate and (self.stays_inside or kept_ratio)
 
 
 def measure(pushed: Pushed, rate: float) -> list[Swing]:
-    """Returns the measures of each loop, worked out as if it were alone.
+    """Returns the measures of each loop, computed as if it were alone.
 
-    Slow swings are measured in fewer, longer pieces, those too slow for these from turn to turn.
-    Of one that rests but for a slow swing that no hand feels, and a fast one that it does, the fast one is measured.
+    Slow swings are measured in fewer, longer pieces, and those too slow for these from turn to turn. If a loop rests
+    except for a slow swing that no hand feels and a fast one that a hand does feel, the fast one is measured.
 
     ``rate``: ticks a second.
     """
@@ -141,7 +142,7 @@ def measure(pushed: Pushed, rate: float) -> list[Swing]:
 def _measured(
     pushed: Pushed, rate: float, frequency: np.ndarray, times_felt: np.ndarray, pieces: int
 ) -> Iterator[tuple[Any, ...]]:
-    """Returns of each loop what its ``Swing`` holds after the time."""
+    """Yields for each loop the fields of its ``Swing`` after the time."""
     small_x, large_x, command, *of_each = pushed
     ticks = large_x.shape[-1]
     size, last_half, last_quarter = ticks // pieces, slice(ticks // 2, None), slice(-ticks // 4, None)
@@ -177,7 +178,7 @@ def _measured(
 
 
 def _settling_s(x: np.ndarray, rate: float) -> np.ndarray:
-    """Returns the times from which on x, shape (loops, ticks), stays within 5 % of its way, or within what remains."""
+    """Returns the times from which on x, shape (loops, ticks), stays within 5 % of its travel, or what remains."""
     quarter = x[:, -x.shape[1] // 4 :]
     apart = np.abs(x - quarter.mean(axis=1, keepdims=True))
     within = np.maximum(_SETTLED * apart.max(axis=1), np.maximum(np.ptp(quarter, axis=1), REST_M))
@@ -186,13 +187,13 @@ def _settling_s(x: np.ndarray, rate: float) -> np.ndarray:
 
 
 def _by_turns(swing: Swing, small_x: np.ndarray, large_x: np.ndarray, rate: float) -> Swing:
-    """Returns the measures of a swing too slow for its pieces, shape (ticks,), from its turns if they are enough."""
+    """Returns a swing, measured by its turns if too slow for its pieces and if they suffice; x: shape (ticks,)."""
     if swing.covers or swing.most_m < REST_M:
         return swing
     small, large = turns_of(small_x, rate), turns_of(large_x, rate)
     if not (small and large):
         return swing
-    # Turns of something faster beside the swing are not its own.
+    # Turns of a faster motion beside the swing are not its own.
     if not all(SAME[0] < turns.frequency_Hz / swing.frequency_Hz < SAME[1] for turns in (small, large)):
         return swing
     slower = min(small, large, key=lambda turns: abs(turns.trend.rate_1_s))

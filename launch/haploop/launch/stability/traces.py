@@ -33,34 +33,34 @@ class Trend(NamedTuple):
 def widths(x: np.ndarray, size: int) -> np.ndarray:
     """Returns the width of x about its straight trend, peak to peak, in pieces of ``size`` samples, oldest first.
 
-    ``x`` is of shape (..., samples), the result of shape (..., pieces); samples left over come first.
+    ``x`` is of shape (..., samples), the result of shape (..., pieces); leftover samples, at the start, are dropped.
     """
     pieces = x[..., x.shape[-1] % size :].reshape(*x.shape[:-1], -1, size)
     return np.ptp(about_trend(pieces), axis=-1)
 
 
 def level_widths(x: np.ndarray, size: int) -> np.ndarray:
-    """Returns what ``widths`` does, about a trend that a swing does not tilt, fitted under a window of Hann.
+    """Returns what ``widths`` does, but about a trend that a swing does not tilt, fitted under a Hann window.
 
-    A straight line through a piece that does not hold whole periods of a swing is tilted by it, and the width about
-    that is up to 15 % too large where a piece covers two periods; this one is, up to 8 %, and up to 3 % from four on.
+    A swing tilts a straight line through a piece that does not hold whole periods of it, and the width about that line
+    is up to 15 % too large if a piece covers two periods; this width is up to 8 % too large, from four periods on 3 %.
     """
     return np.ptp(_about_trend(x, size)[0], axis=-1)
 
 
 def sizes(x: np.ndarray, size: int) -> np.ndarray:
-    """Returns what ``widths`` would of a sine, from the mean square about the trend under a window of Hann.
+    """Returns what ``widths`` would return for a sine, from the mean square about the trend under a Hann window.
 
-    The least and the greatest of a piece that does not hold whole periods depend on where it begins, which a row of
-    pieces turns into a growth that is none, of up to 0.2 in the logarithm over twelve of them; these come to 0.03 of it
-    where a piece covers two periods, and to 0.002 where it covers three.
+    The minimum and maximum of a piece that does not hold whole periods depend on where it begins. Over a row of pieces
+    this looks like growth, of up to 0.2 in the logarithm over twelve of them; with these sizes it is up to 0.03 if a
+    piece covers two periods, and 0.002 if it covers three.
     """
     offset, weight = _about_trend(x, size)
     return np.sqrt(8.0 * np.vecdot(np.square(offset, out=offset), weight))
 
 
 def _about_trend(x: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Returns pieces of ``size`` samples about lines that are fitted under a window of Hann, and the window."""
+    """Returns pieces of ``size`` samples about lines that are fitted under a Hann window, and the window."""
     pieces = x[..., x.shape[-1] % size :].reshape(*x.shape[:-1], -1, size)
     t = np.arange(size) - (size - 1) / 2.0
     weight = np.hanning(size + 2)[1:-1]
@@ -71,7 +71,7 @@ def _about_trend(x: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def trend(width: np.ndarray, spacing_s: float, unsure: np.ndarray | float = 0.0) -> Trend:
-    """Returns the growth of widths that lie ``spacing_s`` apart, shape (..., three at least).
+    """Returns the growth of widths that lie ``spacing_s`` apart, shape (..., at least three).
 
     ``unsure`` is a standard error of the change that does not show in the scatter, shape (...).
     """
@@ -81,7 +81,7 @@ def trend(width: np.ndarray, spacing_s: float, unsure: np.ndarray | float = 0.0)
 
 
 def trend_at(width: np.ndarray, t_s: np.ndarray, seconds: float, unsure: np.ndarray | float = 0.0) -> Trend:
-    """Returns the growth of widths at times from their mean, and their change over so long; see ``trend``."""
+    """Returns the growth of widths at times ``t_s`` from their mean, and the change over ``seconds``; see ``trend``."""
     logs = np.log(np.maximum(width, LEAST_WIDTH_M))
     square = np.vecdot(t_s, t_s)
     rate = np.vecdot(logs, t_s) / square
@@ -91,11 +91,11 @@ def trend_at(width: np.ndarray, t_s: np.ndarray, seconds: float, unsure: np.ndar
 
 
 def frequency_Hz(x: np.ndarray, rate: float) -> np.ndarray:
-    """Returns the frequency at which x, sampled at ``rate`` in Hz, swings most; 0 for one that rests.
+    """Returns the frequency at which x, sampled at ``rate`` in Hz, swings most; 0 if it rests.
 
     The lines of a spectrum lie 1 / duration apart; the peak between them is that of a parabola through the logarithms
-    of the highest and its neighbours, which under a window of Hann is right to 0.05 of that for a sine of three periods
-    or more.
+    of the highest line and its neighbours, which under a Hann window is right to 0.05 of that spacing for a sine of
+    three periods or more.
 
     Args:
         x: shape (..., samples).
@@ -112,10 +112,10 @@ def frequency_Hz(x: np.ndarray, rate: float) -> np.ndarray:
 
 
 def most_felt(x: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """Returns how many times as strong as what is felt x is, and the frequency in Hz that is felt most.
+    """Returns the strength of x as a multiple of what is felt, and the frequency in Hz that is felt most.
 
-    The energies of all frequencies add, each over that of what is felt there (Bensmaia, Hollins and Yau 2005): a fast
-    chatter may be felt under a slow swing that is wider and is not. ``x`` is of shape (..., samples).
+    The energies of all frequencies add, each divided by that of what is felt there (Bensmaia, Hollins and Yau 2005): a
+    fast chatter may be felt under a slow swing that is wider and not felt. ``x`` is of shape (..., samples).
     """
     count = x.shape[-1]
     window, t = np.hanning(count), np.arange(count) - (count - 1) / 2.0
@@ -124,7 +124,7 @@ def most_felt(x: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
     frequencies = np.fft.rfftfreq(count, 1.0 / rate)[1:]
     amplitude = 2.0 / window.sum() * np.abs(np.fft.rfft(offset * window))[..., 1:]
     times_felt = amplitude / smallest_felt_m(frequencies)
-    # A sine has one and a half times the square of its amplitude under a window of Hann.
+    # A sine has one and a half times the square of its amplitude under a Hann window.
     return np.sqrt(np.vecdot(times_felt, times_felt) / 1.5), frequencies[np.argmax(times_felt, axis=-1)]
 
 
@@ -132,7 +132,7 @@ def smallest_felt_m(frequency_Hz: Any) -> Any:
     """Returns the smallest amplitude that is felt at a frequency or at each of an array, 0 to peak, in m.
 
     Straight lines in the logarithms join the points of Israr, Choi and Tan (2006); below the first and above the last
-    the lines go on, and nothing is felt at 0 Hz.
+    the lines continue, and nothing is felt at 0 Hz.
     """
     f, a = np.log(_FREQUENCIES_HZ), np.log(_SMALLEST_M)
     with np.errstate(divide="ignore"):

@@ -1,4 +1,4 @@
-"""A slow swing from turn to turn: its logarithmic decrement needs a few periods, and none of the same length."""
+"""A slow swing from turn to turn: its logarithmic decrement needs a few periods, not necessarily of equal length."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 
 from haploop.launch.stability.traces import Trend, trend_at
 
-# So many swings, each half a period, tell how they change, and how surely.
+# At least this many swings, each half a period, show how they change, and how surely.
 _LEAST = 6
-# A turn counts after a way back of this share of the way before.
+# A turn counts once the way back is this share of the way before.
 _BACK = 0.3
 
 
@@ -19,8 +19,8 @@ class Turns(NamedTuple):
 
     Attributes:
         trend: growth over the second half of the trace.
-        first_m, last_m: of the first swing, and the mean of the last two.
-        frequency_Hz: over the second half.
+        first_m, last_m: width of the first swing, and mean width of the last two.
+        frequency_Hz: frequency over the second half.
     """
 
     trend: Trend
@@ -30,7 +30,7 @@ class Turns(NamedTuple):
 
 
 def turns_of(x: np.ndarray, rate: float) -> Turns | None:
-    """Returns the swings of x, shape (ticks,), at so many ticks a second; None of fewer than 6 in its second half."""
+    """Returns the swings of x, shape (ticks,), at ``rate`` ticks a second; None if its second half has fewer than 6."""
     ticks, at = _turns(x)
     begins = int(np.searchsorted(ticks, len(x) // 2))
     swings_m = np.abs(np.diff(at))
@@ -44,7 +44,7 @@ def turns_of(x: np.ndarray, rate: float) -> Turns | None:
 
 
 def _turns(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the ticks at which x turns, and x there, without its ends; what goes back by little is no turn."""
+    """Returns the ticks at which x turns, and x there, without its ends; a small way back is no turn."""
     moving = np.flatnonzero(np.diff(x))
     ways = np.sign(np.diff(x)[moving])
     extremes = moving[1:][ways[1:] != ways[:-1]]

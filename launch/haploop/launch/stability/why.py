@@ -1,4 +1,4 @@
-"""Sentences on how the swing of a pushed loop goes on, by what was found; the numbers in them are a finding's."""
+"""Sentences on how the swing of a pushed loop continues, by what was found; the numbers in them are a finding's."""
 
 WHY = {
     "diverged": "The run ended by itself: {detail}.",
@@ -29,7 +29,7 @@ WHY = {
     "{run} might tell.",
 }
 DECAYING = ", and still decaying by {0:.3g} +- {1:.2g} 1/s"
-# What is said beside that after a blow, and of the loop without its friction.
+# What is said in addition after a blow, and about the loop without its friction.
 AFTER_BLOW = {
     "rests": " It did after blows of {blow_N:.3g} N for 0.05 s, into the wall and off it, too.",
     "rests off the wall": " It did after blows of {blow_N:.3g} N for 0.05 s, into the wall and off it, too, there "
