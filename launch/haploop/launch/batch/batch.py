@@ -1,4 +1,4 @@
-"""A batch: members of one structure, tick by tick together."""
+"""A batch: members of one structure, advanced together tick by tick."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from haploop.protocol.trees import tree_select, tree_take
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-# A column of a block holds about so many numbers: with fewer, calls of NumPy take longer than what they do; more do not
+# A column of a block holds about this many numbers: with fewer, NumPy calls take longer than their work; more do not
 # stay in the cache. A chain with friction has some twenty columns, which are gone through twice.
 BLOCK, _PARTS_WITH_FRICTION = 98_304, 4
-# An operand that all members share, or all steps of a tick, is copied into buffers of NumPy's unless these are shorter
-# than a row of members; that triples the time such an operation takes.
+# NumPy copies an operand that all members share, or all steps of a tick, into its buffers unless these are shorter than
+# a row of members; the copying triples the time that such an operation takes.
 _BUFFER = 512
-# Members that have ended are computed on, unheeded, until they are more than this share; not with friction, which might
-# switch in them for ever.
+# Members that have ended are still computed, but ignored, until they are more than this share; not with friction, which
+# might switch in them for ever.
 _UNHEEDED = 0.25
 
 
-# For batches of so many ticks in all.
+# For batches of this many ticks in all.
 LOOPS = WhereItPays("haploop.launch.batch.loops", 6_000_000)
 
 
@@ -47,11 +47,11 @@ class BatchEnd(NamedTuple):
     """The end of some members of a batch; trees have the members on the last axis of their arrays.
 
     Attributes:
-        numbers: of their scenes among those of the batch, shape (members,).
-        tick: at which they ended.
-        controller: of the whole batch.
-        params, state: of the controller, for these members.
-        motion, last, line, accelerometer: states of the plant's parts, and the hold in effect last.
+        numbers: numbers of their scenes among those of the batch, shape (members,).
+        tick: tick at which they ended.
+        controller: controller of the whole batch.
+        params, state: those of the controller, for these members.
+        motion, last, line, accelerometer: states of the plant's parts, and the last hold in effect.
         inside: whether each tick of the last half second, or of the second half of a shorter run, was in contact,
             shape (members, ticks).
     """
@@ -73,15 +73,15 @@ class BatchEnd(NamedTuple):
 class Batch(BatchLoop):
     """Scenes of one structure, each a place in arrays: sensor, line, motion, controller and books.
 
-    The code that computes is that of a single run, on arrays. What decides for a single run when it ends is written
-    here for many. A member that diverged has its results and leaves the arrays; one whose numbers cease to be finite
-    leaves them without.
+    The computing code is that of a single run, on arrays. The code that decides when a single run ends is written here
+    for many. A member that diverged gets its results and leaves the arrays; one whose numbers cease to be finite leaves
+    them without results.
 
     Args:
         scenes: resolved scenes for which ``is_batchable`` holds and ``structure`` is the same.
 
     Attributes:
-        results: summary entries of each scene, in their order; None while it runs, or where it has to be run alone.
+        results: summary entries of each scene, in their order; None while it runs, or if it has to be run alone.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class Batch(BatchLoop):
     def run(self) -> None:
         """Runs all members to their ends; on an ElementError the results are void."""
         _keep_freed_memory()
-        with np.errstate(all="ignore"):  # members that have ended may come to anything
+        with np.errstate(all="ignore"):  # members that have ended may reach any values
             np.setbufsize(_BUFFER)
             for tick in range(self._end):
                 if tick in self._changes:
@@ -140,7 +140,7 @@ class Batch(BatchLoop):
                 self._finish(np.flatnonzero(~self._ended), "done" if whole else "stopped")
 
     def _was_refused(self) -> bool:
-        """Tells whether a change could not be made; it is not known for which members it could have been."""
+        """Tells whether a change could not be made; it is not known for which members it could be made."""
         if self._rows.refused:
             self.results = [None] * len(self.results)
             return True
@@ -177,7 +177,7 @@ class Batch(BatchLoop):
             self._drop_ended()
 
     def _finish(self, places: np.ndarray, ended: str, reasons: list[str] | None = None) -> None:
-        """Take the results of members that end here; one whose numbers are not all finite has none."""
+        """Takes the results of members that end here; one whose numbers are not all finite has none."""
         x, v, sound = self._motion.x, self._motion.v, np.isfinite(self._motion.x)
         for force in self._in_flight:
             sound = sound & np.isfinite(force)
@@ -194,7 +194,7 @@ class Batch(BatchLoop):
                 self.results[index] = outcome
 
     def end(self, members: Sequence[int]) -> BatchEnd:
-        """Returns where members that ran to their end stand, by the numbers of their scenes, two at least."""
+        """Returns the end of members that ran to their end, given the numbers of their scenes, at least two."""
         places = np.flatnonzero(np.isin(self._scene_of, members))
         index = self._scene_of[places]
         controller, sensor = self._controller, self._sensor
@@ -230,14 +230,14 @@ class Batch(BatchLoop):
 
 @contextmanager
 def _as_alone(buffer: int) -> Iterator[None]:
-    """NumPy before 2.3 adds so many numbers at a time as its buffers hold: sums are those of a run alone with its.
+    """Gives NumPy the buffers of a run alone, for equal sums: before 2.3 it adds as many numbers at once as they hold.
 
-    And no search for cycles among thousands of dictionaries without any: it would take as long as making them.
+    It also stops the search for cycles among thousands of dictionaries without any, which takes as long as making them.
     """
     was_at_work = gc.isenabled()
     gc.disable()
     try:
-        with np.errstate():  # which gives back the buffers as well
+        with np.errstate():  # which also restores the buffers
             np.setbufsize(buffer)
             yield
     finally:
@@ -246,8 +246,9 @@ def _as_alone(buffer: int) -> Iterator[None]:
 
 
 def _keep_freed_memory() -> None:
-    """Have glibc's malloc keep what is freed: it raises its thresholds to the largest block that it saw freed.
+    """Makes glibc's malloc keep what is freed: it raises its thresholds to the largest block that it saw freed.
 
-    Else it gives the columns of every block back and has their pages zeroed anew, which takes a third of the time.
+    Otherwise it gives the columns of every block back and has their pages zeroed again, which takes a third of the
+    time.
     """
     np.empty(31 << 17)  # 31 MiB; it learns from no more than 32

@@ -21,8 +21,8 @@ class BatchLoop:
 
     Args:
         scene: the stacked scene of all members.
-        controller: of all members, with ``rows`` for its recorder.
-        members: how many they are.
+        controller: controller of all members, with ``rows`` as its recorder.
+        members: number of members.
     """
 
     def __init__(self, scene: Scene, time: Timebase, controller: Controller, rows: BatchRecorder, members: int) -> None:

@@ -1,7 +1,7 @@
-"""Loops of machine code (numba) for what takes longest of a batch with books: formulas of motion and books, compiled.
+"""Loops of machine code (numba) for what takes longest in a batch with books: formulas of motion and books, compiled.
 
-NumPy goes over all members once for every operation, a loop once for all of them. The same operations in the same order
-give the same bits.
+NumPy goes over all members once for each operation, a loop once for all operations. The same operations in the same
+order give the same bits.
 """
 
 from __future__ import annotations
@@ -103,12 +103,12 @@ def _fill(
 
 
 def _of_each(table: np.ndarray) -> int | None:
-    """Returns whether every member has a number of its own: None where they share one, which is another program."""
+    """Returns whether every member has its own number: 1, or None if they share one, which makes another program."""
     return None if table.shape[-1] == 1 else 1
 
 
 def _from_nothing(*shape: int) -> np.ndarray:
-    """Returns sums that nothing was added to; 0.0 + -0.0 would be 0.0."""
+    """Returns sums to which nothing was added, -0.0: 0.0 + -0.0 would be 0.0."""
     return np.full(shape, -0.0)
 
 
@@ -159,15 +159,15 @@ def filled(
 
 
 def _or_numpy(loop: Callable[..., Any], plain: Callable[..., Any]) -> Callable[..., Any]:
-    """Returns a function that does what ``plain`` does, by a loop where numba can compile or load it.
+    """Returns a function that does what ``plain`` does, by a loop if numba can compile or load it.
 
-    Both make all of their results anew, so that what a loop left half done does no harm.
+    Both make all of their results from scratch, so that a loop that stopped half-way does no harm.
     """
 
     def does(*of: Any) -> Any:
         try:
             return loop(*of)
-        except Exception:  # numba's own, and those of a cache that is damaged
+        except Exception:  # numba's own, and those of a damaged cache
             return plain(*of)
 
     return does
@@ -179,7 +179,7 @@ def is_made() -> bool:
 
 
 def try_out() -> None:
-    """Compiles the loops, or loads them, for numbers that all members share; raises whatever numba does."""
+    """Compiles the loops, or loads them, for numbers that all members share; raises whatever numba raises."""
     _code.try_out(_try_out)
 
 

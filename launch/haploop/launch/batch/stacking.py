@@ -14,19 +14,19 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Table
 from haploop.protocol.ticks import DELAY
 
-# What says nothing of what is simulated.
+# Keys that say nothing about what is simulated.
 _ASIDE = ("title", "seed", "run")
 _TIMES = ("clock", "duration", "at", "delay")
-# The device and what it is joined to; how it moves and is pressed is no part of it.
+# The device and what it is joined to; how it moves and is pressed is not part of that.
 _MOVES = ("position", "velocity", "rest", "force")
 _BODIES = ("device", "hand", "transmission", "actuator", "accelerometer")
 
 
 def is_batchable(scene: Scene) -> bool:
-    """Tells whether a resolved scene takes the same way whatever its numbers, so that many can be run as one batch.
+    """Tells whether a resolved scene takes the same path whatever its numbers, so that many can be run as one batch.
 
-    Not so: jitter, loss, another integrator than the exact flow; a delay that changes; a chain whose damping needs the
-    widest float; friction that has to be walked step by step.
+    Not batchable: jitter, loss, an integrator other than the exact flow; a delay that changes; a chain whose damping
+    needs the widest float; friction that has to be followed step by step.
     """
     if any(effect.is_in(scene) and not effect.batches_in(scene) for effect in alone_perhaps()):
         return False
@@ -36,21 +36,21 @@ def is_batchable(scene: Scene) -> bool:
 
 
 def structure(scene: Scene) -> Hashable:
-    """Returns what scenes that are stacked must have in common: all but the values of their numbers.
+    """Returns what scenes must have in common to be stacked: everything except the values of their numbers.
 
-    Times are common, too: the clock, the duration, delays, when events come, the points of a recorded force. So is
-    whether a number is 0, which may mean that something is not there.
+    They also share times: the clock, the duration, delays, the times of events, the points of a recorded force; and
+    whether a number is 0, which may mean that something is absent.
     """
     return next(structures([scene]))
 
 
 def device_of(scene: Scene) -> Hashable:
-    """Returns the numbers of a scene's bodies: scenes in which these are the same share what is made of them."""
+    """Returns the numbers of a scene's bodies: scenes with the same numbers share what is computed from them."""
     return tuple(_structure(vars(scene)[key], True) for key in _BODIES)
 
 
 def structures(scenes: Iterable[Scene]) -> Iterator[Hashable]:
-    """Yields the structure of each scene; an entry that is the object of the scene before is not looked at again."""
+    """Yields the structure of each scene; an entry that is the same object as before is not examined again."""
     before: Mapping[str, object] = {}
     parts: dict[str, Hashable] = {}
     for scene in scenes:
@@ -79,7 +79,7 @@ def _structure(value: Any, by_value: bool) -> Hashable:
 
 
 def stacked(scenes: Sequence[Scene]) -> Scene:
-    """Returns one scene of many with the same structure; numbers that differ are arrays of shape (members,)."""
+    """Returns one scene made of many with the same structure; numbers that differ are arrays of shape (members,)."""
     return _stacked(scenes)
 
 

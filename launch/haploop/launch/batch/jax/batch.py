@@ -1,4 +1,4 @@
-"""A batch that compiled programs take through all ticks at which nothing else changes."""
+"""A batch that compiled programs advance through all ticks at which nothing else changes."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ from haploop.protocol.trees import tree_leaves, tree_map, tree_unflatten
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
-# Ticks that a program goes through at a time, at most: to begin takes as long as several ticks of some hundred members;
-# of more members the hand's forces, where each has its own, would fill the memory.
+# The most ticks that a program goes through at a time: to begin takes as long as several ticks of some hundred members;
+# with many members the hand's forces, if each has its own, would fill the memory.
 _BLOCK_TICKS, _BLOCK_TICKS_OF_MANY, _MANY = 512, 128, 1024
 
 
 class CompiledBatch(Batch):
-    """``Batch`` that goes by itself only at its start and where a change comes, until all that is in effect is known.
+    """``Batch`` that goes uncompiled only at its start and at a change, until all that is in effect is known.
 
     Args:
-        size: of the arrays; places beyond the scenes are computed, unheeded.
+        size: size of the arrays; places beyond the scenes are computed, but ignored.
     """
 
     def __init__(
@@ -62,11 +62,11 @@ class CompiledBatch(Batch):
         resolution = self._logger.window.swing_m
         self._block = max(1, min(self._time.ticks, _BLOCK_TICKS if size <= _MANY else _BLOCK_TICKS_OF_MANY))
         self._window = self._logger.window = CompiledWindow(self._time, resolution, size, spare_ticks=self._block)
-        # A batch of which only the program changes anything needs the window at its end, unless a member diverges.
+        # A batch in which only the program changes anything needs the window at its end, unless a member diverges.
         self._keep_from = 0 if self._changes else max(0, self._end - self._window.kept_ticks)
 
     def _drop_ended(self) -> None:
-        """The size stays."""
+        """Drops nothing: the size stays."""
 
     def run(self) -> None:
         """Runs all members to their ends; on NotCompilable the results are void."""
@@ -86,7 +86,7 @@ class CompiledBatch(Batch):
             self._programs.spare = self._window.rings
 
     def _by_itself(self, first: int, until: int) -> int:
-        """Go on until all forces still in effect are of elements at work; returns the tick where that is."""
+        """Continues until all forces still in effect are from elements at work; returns the tick reached."""
         end = min(first + self._time.lookahead_ticks + 2, until)
         self._book()
         for tick in range(first, end):
@@ -99,7 +99,7 @@ class CompiledBatch(Batch):
         params, state = self._params(), self._state()
         x = self._window.state.x.reshape(-1, self._time.steps_per_tick, len(self._ended))
         rings = Rings(x, {name: self._window.state.rows[name] for name in RINGS})
-        # What no block changes is handed over once: that takes a millisecond of every block otherwise.
+        # What no block changes is handed over once: otherwise this would take a millisecond of every block.
         fixed = jax.device_put((numbers_of(params), np.asarray(self._limit_m)))
         carry, inputs = self._carry(first, state), self._inputs(params, fixed, first, first)
         call = self._call(params, state, (carry, rings, inputs))
@@ -107,7 +107,7 @@ class CompiledBatch(Batch):
         before = deque[tuple[Carry, BlockInputs]](maxlen=-(-self._window.kept_ticks // self._block) + 1)
         while done < until and not self._ended.all():
             end = min(done + self._block, until)
-            if done - first < len(self._window.state.rows["wall_position"]):  # beyond, what would be written is there
+            if done - first < len(self._window.state.rows["wall_position"]):  # beyond, it is already written
                 ring = self._window.state.rows["wall_position"]
                 ring[np.arange(done, end) % len(ring)] = self._controller.params.wall.position
             inputs = self._inputs(params, fixed, done, end)
@@ -125,7 +125,7 @@ class CompiledBatch(Batch):
         self._resume(carry, done)
 
     def _again(self, call: Call, before: Sequence[tuple[Carry, BlockInputs]], rings: Rings) -> tuple[Carry, Rings]:
-        """Go through the last blocks once more, for the windows of members that ended; from now on all is kept."""
+        """Goes through the last blocks again, for the windows of members that ended; from now on all is kept."""
         self._keep_from = 0
         carry, _ = next(iter(before))
         for _, inputs in before:
@@ -165,7 +165,7 @@ class CompiledBatch(Batch):
         )
 
     def _state(self) -> BatchState:
-        """Everything remembered, a number for every member in each leaf."""
+        """Returns everything remembered, with a number for every member in each leaf."""
         assert self._controller.state is not None
         state = BatchState(
             self._motion.state,
@@ -182,7 +182,7 @@ class CompiledBatch(Batch):
         return tree_map(of_each, state)
 
     def _take_state(self, carry: Carry, template: BatchState, first: int, end: int) -> None:
-        """Have the objects of the batch stand where the program has brought them at tick ``end``."""
+        """Puts the objects of the batch into the state that the program has reached at tick ``end``."""
         motion, acting, saturated, noise, controller = tree_unflatten(template, map(np.array, carry.state))
         newest = end - 1 - self._time.delay_steps // self._time.steps_per_tick
         self._motion.state, self._motion.last = motion, (0, acting, newest)
@@ -208,7 +208,7 @@ class CompiledBatch(Batch):
         return BlockInputs(*fixed, ticks_in, np.int64(first), np.int64(end - first), np.int64(self._keep_from))
 
     def _rows_of(self, draw: Draw, ticks: int) -> np.ndarray:
-        """The next random numbers, shape (block,) or (block, members)."""
+        """Returns the next random numbers, shape (block,) or (block, members)."""
         one_for_all = not isinstance(draw, NormalRows)
         rows = np.zeros((self._block, *([] if one_for_all else [len(self._ended)])))
         for row in range(ticks):
@@ -239,13 +239,13 @@ class CompiledBatch(Batch):
         return past
 
     def _last(self, carry: Carry, tick: int) -> list[dict[str, np.ndarray]]:
-        """The forces of the ticks before ``tick`` of which a command has yet to act, or is the last to have acted."""
+        """Returns the forces of the ticks before ``tick`` whose command has yet to act, or was the last to act."""
         past = {name: np.asarray(ring) for name, ring in carry.past.items()}
         size = len(past["command"])
         return [{name: ring[k % size].copy() for name, ring in past.items()} for k in range(tick - size + 1, tick)]
 
     def _fetch(self, carry: Carry, rings: Rings, *, writable: bool) -> None:
-        """Let the logger have what the program has kept."""
+        """Hands what the program has kept to the logger."""
         window, books = self._window, self._logger.books
         window.take(rings, writable=writable)
         least, most, strongest = map(np.array, carry.extremes)

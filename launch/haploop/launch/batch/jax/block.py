@@ -28,21 +28,21 @@ from haploop.protocol.trees import tree_leaves, tree_map, tree_unflatten
 
 T = TypeVar("T")
 
-# Rings of the window that are written at every tick, beside that of x.
+# Rings of the window that are written at every tick, besides that of x.
 RINGS = ("x", "total", "in_contact")
 
 
 class Carry(NamedTuple):
-    """State carried from tick to tick; arrays of shape (members,) where nothing else is said.
+    """State carried from tick to tick; arrays of shape (members,) unless stated otherwise.
 
     Attributes:
         state: leaves of the state.
         extremes: least and greatest x in m, greatest force in N.
-        books: sum and error of every book, by name; within a block the sum of what it has added.
+        books: sum and error of every book, by name; within a block, the sum of what the block has added.
         x_m: measured position at the last tick.
-        past: commands (by the name "command"), forces of the wall and of every element's book, of all ticks from the
-            oldest command that acts in the next interval on, and of one before, tick k in row k modulo L + 2; shape
-            (L + 2, members) each.
+        past: commands (by the name "command"), forces of the wall and of every element's book, at all ticks from that
+            of the oldest command that acts in the next interval on, and at one tick before, tick k in row k modulo
+            L + 2; shape (L + 2, members) each.
     """
 
     state: list[Any]
@@ -58,7 +58,7 @@ class Rings(NamedTuple):
     """Rings that a window is read from: the last ticks, tick k in row k modulo the length.
 
     Attributes:
-        x: at the plant steps after each tick, up to the next, shape (ticks, n, members).
+        x: position at the plant steps after each tick, up to the next, shape (ticks, n, members).
         rows: columns of the controller, shape (ticks, members) each.
     """
 
@@ -67,7 +67,7 @@ class Rings(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Leaves of parameters that a program is given anew for every group: all floats as one array, and the arrays."""
+    """Leaves of parameters that a program is given again for every group: all floats as one array, and the arrays."""
 
     floats: Any
     arrays: list[Any]
@@ -77,9 +77,9 @@ class BlockInputs(NamedTuple):
     """Inputs of a block.
 
     Attributes:
-        limit_m: beyond which a member has diverged.
-        ticks_in: inputs of every tick, a row each.
-        keep_from: ticks from this one on go into the rings; those before into two rows that stay in the cache, as
+        limit_m: limit beyond which a member has diverged.
+        ticks_in: inputs of every tick, one row each.
+        keep_from: ticks from this one on go into the rings; those before into two rows that stay in the cache, since
             writing all of them to memory would take as long as computing them.
     """
 
@@ -99,7 +99,7 @@ def numbers_of(params: Any) -> Numbers:
 
 
 def with_numbers(params: T, numbers: Numbers) -> T:
-    """Returns the tree with these numbers in the places of its own."""
+    """Returns the tree with these numbers in place of its own."""
     floats, arrays = iter(numbers.floats), iter(numbers.arrays)
 
     def renewed(leaf: Any) -> Any:
@@ -119,7 +119,7 @@ class Block:
     """The program of a block.
 
     Args:
-        params, state: of a batch; another one with as many numbers of the same shapes is served as well.
+        params, state: those of a batch; the program also serves another with as many numbers of the same shapes.
     """
 
     def __init__(self, params: BatchParams, state: BatchState, book_names: tuple[str, ...], has_wall: bool) -> None:
@@ -127,13 +127,13 @@ class Block:
         self._book_names, self._has_wall = book_names, has_wall
 
     def run(self, carry: Carry, rings: Rings, inputs: BlockInputs) -> tuple[Carry, Rings]:
-        """Goes through the ticks of a block; NotCompilable where the state after one is none to begin a tick with."""
+        """Goes through the ticks of a block; raises NotCompilable if no tick can begin with the state after a tick."""
         params = with_numbers(self._params, inputs.params)
 
         def body(i: Any, now: tuple[Carry, Rings]) -> tuple[Carry, Rings]:
             return self._step(*now, params, inputs, i)
 
-        # A block's own sums are short, so their rounding is: only where they join the books is what is lost kept.
+        # A block's own sums are short, and so is their rounding: what is lost is kept only where they join the books.
         none = {name: jnp.zeros_like(sums) for name, (sums, _) in carry.books.items()}
         ended, rings = jax.lax.fori_loop(0, inputs.ticks, body, (carry._replace(books=none), rings))
         books = {name: _add(carry.books[name], of_block) for name, of_block in ended.books.items()}
@@ -146,7 +146,7 @@ class Block:
         size, length = len(carry.past["command"]), rings.x.shape[0]
         state, at_tick = tree_unflatten(self._state, carry.state), inputs.ticks_in.at(i, rings.x.shape[1])
         command = decided(params, state, at_tick)
-        # Written before anything is read of them, the rings of forces need not be copied.
+        # The rings of forces need not be copied, as they are written before anything is read from them.
         past = {name: ring.at[now % size].set(command.forces[name]) for name, ring in carry.past.items()}
         before = [{name: ring[(now - ago) % size] for name, ring in past.items()} for ago in (size - 1, size - 2, 1)]
         after, told = moved(params, state, at_tick, command, before[1]["command"])
@@ -164,7 +164,7 @@ class Block:
             jnp.maximum(most, told.x.over(jnp.maximum)),
             jnp.maximum(strongest, abs(held).over(jnp.maximum)),
         )
-        # Nothing is added to the books of a member that has ended; of all else it keeps what was.
+        # Nothing is added to the books of a member that has ended; everything else it keeps as it was.
         books = {
             name: book + jnp.where(carry.running, added[name], 0.0) if name in added else book
             for name, book in carry.books.items()
@@ -198,7 +198,7 @@ class Block:
 
 
 def _as_before(before: list[Any], after: BatchState) -> list[Any]:
-    """The leaves of a state in the shapes and types that they had before the tick."""
+    """Returns the leaves of a state in the shapes and types that they had before the tick."""
     leaves = tree_leaves(after)
     if len(leaves) != len(before):
         raise NotCompilable("What is remembered grows from tick to tick.")
@@ -212,9 +212,9 @@ def _as_before(before: list[Any], after: BatchState) -> list[Any]:
 
 
 def _apart(go: Any, make: Callable[[], Any]) -> Any:
-    """Returns the result of ``make``, made from numbers in memory and put into memory: no part of it is made twice.
+    """Returns the result of ``make``, computed from numbers in memory and put into memory: no part is computed twice.
 
-    A compiler that fuses by itself makes for each of many results anew what they have in common; one for a GPU may.
+    A compiler that fuses on its own computes what many results have in common again for each; one for a GPU may do so.
     ``go`` is true, which the compiler cannot know.
     """
     if jax.default_backend() != "cpu":

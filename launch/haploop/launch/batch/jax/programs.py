@@ -16,10 +16,10 @@ import numpy as np
 
 from haploop.launch.batch.jax.block import BlockInputs, Carry, Rings
 
-# How many are kept.
+# How many programs are kept.
 _MOST = 64
-# On a CPU a loop over ticks is one function of machine code if XLA takes its arrays for small; else every operation is
-# a call of its own, which takes longer than what it does. There is no other way to say so than before jax first runs.
+# On a CPU a loop over ticks is one function of machine code if XLA takes its arrays for small; otherwise every
+# operation is a separate call, which takes longer than its work. This can only be set before jax first runs.
 _ONE_FUNCTION = "xla_cpu_small_while_loop_byte_threshold"
 # Arrays of members fill the widest registers there are.
 _WIDE: dict[str, Any] = {"xla_cpu_prefer_vector_width": 512}
@@ -32,12 +32,12 @@ Call = Callable[[Carry, Rings, BlockInputs], tuple[Carry, Rings]]
 
 
 class Programs:
-    """Programs by what they depend on; the one not used for longest goes first.
+    """Programs by what they depend on; the least recently used one is dropped first.
 
     Attributes:
         asked: how many ticks of members of a structure were asked for so far.
-        spare: rings that a batch is done with. Their memory serves the next one: getting it anew, and putting zeros
-            into it, takes a third as long as a batch without books does.
+        spare: rings that a batch is done with. Their memory serves the next batch: allocating it again, and putting
+            zeros into it, takes a third as long as a batch without books.
     """
 
     def __init__(self) -> None:
@@ -47,7 +47,7 @@ class Programs:
         self.spare: Rings | None = None
 
     def call(self, key: Hashable, run: Call, args: tuple[Carry, Rings, BlockInputs]) -> Call:
-        """Returns the machine code of a block, compiled for arguments of these shapes where the key is not known."""
+        """Returns the machine code of a block, compiled for arguments of these shapes if the key is not known."""
         if key in self._kept:
             self._kept.move_to_end(key)
         else:
@@ -65,7 +65,7 @@ class Programs:
         return compiled
 
     def begun(self, rings: Rings, ticks: int) -> Rings:
-        """These rings of NumPy, in spare memory if it fits; the first rows, so many, and the last are in use."""
+        """Returns these NumPy rings, in spare memory if it fits; the first ``ticks`` rows and the last are in use."""
         spare, self.spare = self.spare, None
         fits = spare is not None and jax.tree.map(np.shape, spare) == jax.tree.map(np.shape, rings)
         if not fits or ticks >= len(rings.x):
@@ -83,7 +83,7 @@ PROGRAMS = Programs()
 
 
 def in_double() -> AbstractContextManager[object]:
-    """Within it jax computes in float64; outside it is as it was."""
+    """Returns a context in which jax computes in float64; outside it jax is as it was."""
     enable_x64: Any = getattr(jax, "enable_x64", None)
     if enable_x64 is None:  # jax before 0.8
         enable_x64 = import_module("jax.experimental").enable_x64
@@ -94,7 +94,7 @@ def in_double() -> AbstractContextManager[object]:
 def most() -> int:
     """Returns how many members suit the device: on a CPU so many that what a tick works on stays in the cache.
 
-    Where nothing has used jax before, it is told here how to start; what the user has told it stands.
+    If nothing has used jax before, it is told here how to start; the user's own settings for it are kept.
     """
     told = {_TAKES_ALL: os.environ.get(_TAKES_ALL, "false")}
     if _OPTIONS not in (flags := os.environ.get(_FLAGS, "")):

@@ -1,4 +1,4 @@
-"""A column that is a list of its rows: what formulas make of it falls apart into what is done to every row."""
+"""A column that is a list of its rows: formulas applied to it separate into operations on each row."""
 
 from __future__ import annotations
 
@@ -90,15 +90,15 @@ class Rows:
         return Rows([abs(row) for row in self.rows])
 
     def astype(self, _dtype: Any, copy: bool = True) -> Rows:
-        """All is float64 already."""
+        """Returns itself: all is float64 already."""
         return self
 
     def copy(self) -> Rows:
-        """Rows are not changed in place."""
+        """Returns itself: rows are not changed in place."""
         return self
 
     def over(self, operation: Callable[[Any, Any], Any]) -> Any:
-        """All rows taken together, first to last."""
+        """Returns all rows combined by an operation, first to last."""
         return reduce(operation, self.rows)
 
     def __array_namespace__(self) -> Any:

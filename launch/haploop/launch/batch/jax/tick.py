@@ -23,23 +23,23 @@ from haploop.protocol.walls.wall import Wall
 
 # Force of the wall and of every element at one tick.
 Forces = dict[str, jax.Array]
-# Gives what a function gives, made once for all that needs it.
+# Returns what a function returns, computed once for all that need it.
 Apart = Callable[[Callable[[], Any]], Any]
 
 
 class NotCompilable(Exception):
-    """A batch whose tick is no function that could be compiled; the message says why."""
+    """A batch whose tick is not a function that could be compiled; the message says why."""
 
 
 class BatchParams(NamedTuple):
     """Parameters of a batch that a tick reads: a tree of numbers, shared by all members or with a number for each.
 
     Attributes:
-        held, mechanics, transition, rest_N: of the motion of one mass.
-        noise: of the position, or None.
+        held, mechanics, transition, rest_N: those of the motion of one mass.
+        noise: noise of the position, or None.
         feels: whether samples carry the acceleration.
         lookahead, late_steps: L and r of a round-trip delay of L n + r plant steps.
-        books: of the books of the plant; None without books.
+        books: parameters of the books of the plant; None without books.
     """
 
     held: Any
@@ -57,12 +57,12 @@ class BatchParams(NamedTuple):
 
 
 class BatchState(NamedTuple):
-    """Everything that a batch remembers from tick to tick but for commands in flight; arrays of shape (members,).
+    """Everything that a batch remembers from tick to tick except commands in flight; arrays of shape (members,).
 
     Attributes:
         acting: force held at the end of the last interval, N.
         saturated: commands clipped so far.
-        noise: of the position at the last tick, m.
+        noise: noise of the position at the last tick, m.
     """
 
     motion: OneMassState
@@ -77,7 +77,7 @@ class TickInputs(NamedTuple):
 
     Attributes:
         tau: hand force at the steps of the interval and at its end, N, shape (n + 1, 1 or members).
-        response: forced response in the interval, shape (n + 1, 2, 1), where all members have the same; else None.
+        response: forced response in the interval, shape (n + 1, 2, 1), if all members have the same; else None.
         noise: standard normal numbers, shape (members,) or (); None without noise.
         zero: a whole number that the compiler cannot know.
     """
@@ -98,10 +98,10 @@ class Decided(NamedTuple):
     """Outcome of a tick up to the controller's command.
 
     Attributes:
-        noise: of the position, m.
-        controller: its state after the tick.
+        noise: noise of the position, m.
+        controller: state of the controller after the tick.
         row: x, total and in_contact of the controller.
-        forces: of the wall and of every element, N, by the names of their accounts, and the "command".
+        forces: those of the wall and of every element, N, by the names of their accounts, and the "command".
     """
 
     noise: Any
@@ -114,8 +114,8 @@ class Moved(NamedTuple):
     """The interval after a tick.
 
     Attributes:
-        x, v, x_comp: at the steps of the interval and at its end, n + 1 rows.
-        tau: of the hand at these steps, N, n + 1 rows.
+        x, v, x_comp: values at the steps of the interval and at its end, n + 1 rows.
+        tau: force of the hand at these steps, N, n + 1 rows.
         held: (steps, force in N) of every hold.
     """
 
@@ -127,7 +127,7 @@ class Moved(NamedTuple):
 
 
 def decided(params: BatchParams, state: BatchState, inputs: TickInputs) -> Decided:
-    """Returns what the sensor tells the controller at a tick, and what it makes of that."""
+    """Returns what the sensor tells the controller at a tick, and how the controller answers."""
     x, noise = state.motion.x, state.noise
     if params.noise is not None:
         noise = params.noise.after(noise, inputs.noise)
@@ -147,7 +147,7 @@ def moved(
     """Returns the state at the end of the interval after a tick, and how the plant got there.
 
     Args:
-        command: computed L ticks ago, N, which acts from r steps after the tick on.
+        command: the command computed L ticks ago, N, which acts from r steps after the tick on.
     """
     newer, saturated = command, state.saturated
     if params.actuator is not None:
@@ -167,7 +167,7 @@ def moved(
 
 
 def _response(params: BatchParams, inputs: TickInputs) -> Rows:
-    """The forced response at the steps of the interval and at its end."""
+    """Returns the forced response at the steps of the interval and at its end."""
     if inputs.response is not None:
         return Rows(list(inputs.response))
     load = Rows(list(inputs.tau)) + params.rest_N
@@ -176,7 +176,7 @@ def _response(params: BatchParams, inputs: TickInputs) -> Rows:
 
 
 def _filled(held: Any, noted: list[Any], response: Rows, end: OneMassState) -> tuple[Rows, Rows, Rows]:
-    """x, v and x_comp at the steps of the interval and at its end, from what was noted of its holds."""
+    """Returns x, v and x_comp at the steps of the interval and at its end, from what was noted of its holds."""
     x_rows, v_rows, x_comp_rows, first = [], [], [], 0
     for at in range(0, len(noted), NOTED):
         count, x, v, x_comp, v_comp, force, _ = noted[at : at + NOTED]
@@ -193,9 +193,9 @@ def _filled(held: Any, noted: list[Any], response: Rows, end: OneMassState) -> t
 
 
 def rounded(value: Any, zero: Any) -> Any:
-    """Returns the value itself, but not to be made one with what is computed of it, in a single rounding.
+    """Returns the value itself, which a compiler cannot merge with what is computed from it into one rounding.
 
-    A measured position may lie on the face of the wall, and is in contact if it is beside it by a last bit.
+    A measured position may lie on the face of the wall, and is in contact if it is off by a last bit.
     """
     bits = jax.lax.bitcast_convert_type(value, zero.dtype)
     return jax.lax.bitcast_convert_type(bits ^ zero, value.dtype)
@@ -208,10 +208,10 @@ def added_in_tick(
     """Returns what a tick adds to each book, J, by the names of ``Books``; shape (members,).
 
     Args:
-        now, before: forces of wall and elements computed at the tick, and at the one before.
-        acting: those computed with the two newest commands that act in its interval.
+        now, before: forces of wall and elements computed at the tick, and at the tick before.
+        acting: forces computed with the two newest commands that act in its interval.
         x_m: measured position at the tick before and at this one, m.
-        apart: for what several books need; a compiler would make it for each of them anew.
+        apart: computes once what several books need; a compiler would compute it again for each of them.
     """
     x, v, tau = told.x, told.v, told.tau
     n, summed = len(x) - 1, partial(_sum_steps, apart)
@@ -241,7 +241,7 @@ def added_in_tick(
 
 
 def _sum_steps(apart: Apart, flow: Rows, first: int = 0, end: int | None = None) -> Rows:
-    """``sum_steps`` of one tick, made once."""
+    """Returns ``sum_steps`` of one tick, computed once."""
     return Rows([apart(lambda: flow[first:end].over(add))])
 
 

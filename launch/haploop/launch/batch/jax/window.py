@@ -1,4 +1,4 @@
-"""Measures of the windows of a batch, worked out by a program that goes through their rings step by step."""
+"""Measures of the windows of a batch, computed by a program that goes through their rings step by step."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class CompiledWindow(Window):
     rings: Rings | None = None
 
     def take(self, rings: Rings, *, writable: bool) -> None:
-        """Takes the rings of a program; ``writable`` where the batch is to go on by itself."""
+        """Takes the rings of a program; ``writable`` if the batch is to continue uncompiled."""
         held = np.array if writable else np.asarray
         x, rows = held(rings.x).reshape(-1, len(self.swing_m)), {name: held(ring) for name, ring in rings.rows.items()}
         self.state = self.state._replace(x=x, rows=self.state.rows | rows)
         self.rings = None if writable else rings
 
     def measures(self, places: Iterable[int] = (0,)) -> Iterator[RunMeasures]:
-        """Yields the measures of these members; figures to the last digits, a crossing by less may count or not."""
+        """Yields the measures of these members, exact but for the last digits; a crossing by less may count or not."""
         rate, n, steps = self._time.plant_rate, self._time.steps_per_tick, self.state.steps
         span = window_span(steps, keep_steps(rate), n)
         if self.rings is None or steps < span.steps + n:
@@ -45,7 +45,7 @@ class CompiledWindow(Window):
         found = _look(self.rings.x, rows, np.int64(steps), self.swing_m, steps=span.steps + 1, ticks=span.ticks)
         crossings, growth, width, inside, *means = (np.asarray(column)[wanted].tolist() for column in found)
         stiffness, depth = _where_any(*means[:2]), _where_any(*means[2:])
-        # Gone through once a run: a transform by NumPy costs less than a program for it.
+        # Done once a run: a transform by NumPy costs less than a program for it.
         command = last_rows(np.asarray(self.rings.rows["total"]), steps // n, wanted)[:, -span.ticks :]
         parts = [command[first : first + TOGETHER] for first in range(0, len(command), TOGETHER)]
         ripples = np.concatenate([ripple(part, self._time.control_rate) for part in parts])
@@ -71,13 +71,13 @@ class _Swings(NamedTuple):
 
 @partial(jax.jit, static_argnames=("steps", "ticks"))
 def _look(x: Any, rows: dict[str, jax.Array], ran: Any, swing_m: Any, *, steps: int, ticks: int) -> list[Any]:
-    """Returns the columns of ``MeasuredColumns`` but the last two, the counts before each mean; see ``measure_window``.
+    """Returns the columns of ``MeasuredColumns`` but the last two, with counts before means; see ``measure_window``.
 
     Args:
         x: positions, shape (ticks kept, n, members); rows: ``CONTROLLER_COLUMNS``, shape (ticks kept, members).
-        ran: steps that the members have run.
+        ran: number of steps that the members have run.
         swing_m: what does not count as a swing, shape (members,).
-        steps, ticks: of the window.
+        steps, ticks: length of the window.
     """
     n, members = x.shape[1], len(swing_m)
     x = x.reshape(-1, members)
@@ -110,7 +110,7 @@ def _look(x: Any, rows: dict[str, jax.Array], ran: Any, swing_m: Any, *, steps: 
 
 
 def _in_contact(rows: dict[str, jax.Array], ran: Any, ticks: int) -> list[Any]:
-    """Returns, of the last ticks: those in contact; how many show a stiffness, its mean; and the mean depth."""
+    """Returns, for the last ticks: how many are in contact; how many show a stiffness, its mean; and the mean depth."""
     length, members = rows["x"].shape
 
     def add(i: Any, so_far: list[Any]) -> list[Any]:
