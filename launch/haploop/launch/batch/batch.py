@@ -140,7 +140,7 @@ class Batch(BatchLoop):
                 self._finish(np.flatnonzero(~self._ended), "done" if whole else "stopped")
 
     def _was_refused(self) -> bool:
-        """Tells whether a change could not be made; it is not known for which members it could be made."""
+        """Tells whether a change could not be made; it is not known for which members it could have been made."""
         if self._rows.refused:
             self.results = [None] * len(self.results)
             return True

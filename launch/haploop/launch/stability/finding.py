@@ -64,7 +64,7 @@ class Finding:
         blow_N: for a loop that rests after the push, a harder push, into the wall and off it; None if not asked.
         blown: what it does after these: rests, rests off the wall, swings on, or undecided; None if not asked.
         frictionless: what a loop that also rests after these would do after the push without its friction: rests,
-            swings on, swings on a part of a count deeper, or undecided; None if not asked, or without friction.
+            swings on, swings on a part of a count deeper, or undecided; None if not asked, or if it has no friction.
         deeper_N: for a loop without friction that rests, how much harder the hand holds it where it lies a part of an
             encoder's count deeper; None if not asked, or without counts.
         deeper: what it does there: rests, swings on, or undecided; None if not asked.

@@ -17,7 +17,7 @@ _LOOKED_AT = 64
 _STAYS = 1e-3
 # Standard errors from which on a change counts: if the loop is watched for longer, and if this is the last look.
 _ERRORS, _ERRORS_AT_LAST = 1.0, 4.0
-# For less than this time a swing of the loop's own hides a change.
+# Within less than this time, s, a swing of the loop's own hides a change.
 _LEAST_S = 4.0
 
 

@@ -17,7 +17,7 @@ from haploop.logger.verdict.ripple import RIPPLE_ABOVE_HZ, above, ripple
 _PIECES, _FEW_PIECES = 24, 8
 _LEAST_PERIODS = 2.0
 # Effect of where in a period the pieces begin on the change of the logarithm of the width, times the eighth power of
-# the periods that a piece covers (found with sines); its smallest and largest value.
+# the periods that a piece covers (found with sines); the smallest and the largest effect.
 _PHASE, _UNSURE = 6.0, (1e-4, 1.0)
 # A swing this small is rounding: a thousand atoms would be wider.
 REST_M = 1e-9
@@ -68,7 +68,7 @@ class Swing(NamedTuple):
         frequency_Hz: frequency at the end.
         ripple_N: swing of the command above 30 Hz after the larger push, peak to peak, in the last quarter.
         covers: whether a piece covers enough periods to show how the swing changes, or its turns show it.
-        times_felt: how strong the last quarter of either is, as a multiple of what is felt.
+        times_felt: how strong the last quarter of either is, as a multiple of the least that is felt.
         settles_s: time after the larger push from which on the swing stays within 5 % of its travel, or within what
             remains; 0 if it did not move.
     """

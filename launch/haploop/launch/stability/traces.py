@@ -112,10 +112,10 @@ def frequency_Hz(x: np.ndarray, rate: float) -> np.ndarray:
 
 
 def most_felt(x: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """Returns the strength of x as a multiple of what is felt, and the frequency in Hz that is felt most.
+    """Returns the strength of x as a multiple of the least that is felt, and the frequency in Hz that is felt most.
 
-    The energies of all frequencies add, each divided by that of what is felt there (Bensmaia, Hollins and Yau 2005): a
-    fast chatter may be felt under a slow swing that is wider and not felt. ``x`` is of shape (..., samples).
+    The energies of all frequencies add, each divided by that of the least felt there (Bensmaia, Hollins and Yau 2005):
+    a fast chatter may be felt under a slow swing that is wider and not felt. ``x`` is of shape (..., samples).
     """
     count = x.shape[-1]
     window, t = np.hanning(count), np.arange(count) - (count - 1) / 2.0
