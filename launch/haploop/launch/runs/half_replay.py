@@ -86,7 +86,7 @@ def beside_own(
 ) -> str:
     """Returns a sentence on how far the foreign program in a role departed from what haploop's own would have done.
 
-    Refused changes are left out; "" if the log does not hold what haploop's own would have to be told.
+    Refused changes are left out; "" if the log does not hold the input that haploop's own would need.
     """
     refused = iter(change.refused is not None for change in changes_of(events))
     made = [(tick, event) for tick, event in events if not (is_change(event) and next(refused))]
