@@ -71,11 +71,11 @@ class Finding:
         hardest_N: for a loop that rests then too, the hardest hold that its hand reached; None if that was about the
             last one, or if the hand does not move.
         at_hardest: what it does there: rests, swings on, or undecided; None if not asked.
-        without: of a loop that swings, what it does without its ``delay``, with a much finer ``encoder``, without its
-            ``elements``, and without ``all`` of these where it swings on without any: rests, swings on, or undecided;
-            None if not asked.
-        settles_s: how long after the push it came within 5 % of where it rests; None of one that does not.
-        memory_drifts: whether what an element remembers still goes on changing where the loop rests.
+        without: for a loop that swings, what it does without its ``delay``, with a much finer ``encoder``, without its
+            ``elements``, and without ``all`` of these if it swings on without any one of them: rests, swings on, or
+            undecided; None if not asked.
+        settles_s: how long after the push it came within 5 % of where it rests; None if it does not.
+        memory_drifts: whether the memory of an element still changes while the loop rests.
     """
 
     word: str
