@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> object:
-    """Imports what reads logs when it is first asked for: NumPy and the libraries of the file take a while."""
+    """Imports the functions that read logs on first use: NumPy and the libraries of the file take a while to load."""
     if name not in ("read", "stream"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from haploop.logger.log import stream

@@ -44,9 +44,9 @@ class Row(Protocol):
 
 
 class MemberEnd(NamedTuple):
-    """The end of one member of a batch: where it is in the arrays, and how the device ended.
+    """The end of one member of a batch: its place in the arrays, and the final position and velocity of the device.
 
-    ``reason`` says why the plant ended by itself, or is None.
+    ``reason`` says why the plant itself ended the run, or is None.
     """
 
     place: int
@@ -57,11 +57,11 @@ class MemberEnd(NamedTuple):
 
 
 class BatchLogger:
-    """Books the intervals of a batch, whose plant and controller come block by block, and tells what came of each run.
+    """Books the intervals of a batch, block by block of plant and controller, and reports the result of each run.
 
     Attributes:
-        rows: the last controller rows, which books still need; the latest is of tick ``tick - 1``.
-        changes: those of every member alike.
+        rows: the last controller rows, which the books still need; the latest is of tick ``tick - 1``.
+        changes: made in every member alike.
         tick: every interval before it is booked.
     """
 
@@ -76,9 +76,9 @@ class BatchLogger:
         self.tick = 0
 
     def book(self, plant: dict[str, np.ndarray], rows: Sequence[Row], wall: Wall) -> None:
-        """Books the intervals from ``tick`` on: plant columns of shape (ticks * n + 1, members), and a row a tick.
+        """Books the intervals from ``tick`` on: plant columns of shape (ticks * n + 1, members), and one row per tick.
 
-        ``wall`` is as it stands in all of them.
+        ``wall`` is the wall in all of them.
         """
         first, ticks, x = self.tick, len(rows), plant["x"]
         members = x.shape[1]
@@ -88,7 +88,7 @@ class BatchLogger:
             if first == 0:
                 self.books.start(plant)
             self.books.book_batch(first, plant, self._commanded(first + ticks, wall, members))
-            # Commands that are still in effect, and the last row, are needed once more.
+            # The rows of commands that are still in effect, and the last row, are needed again.
             needed = first + ticks - min(first + ticks - 1, int(plant["command"][-1]))
             del self.rows[: max(0, len(self.rows) - needed)]
         self.window.add(x, plant["held_N"], columns)
@@ -98,7 +98,7 @@ class BatchLogger:
         self.note_accounts(rows[-1].elements)
 
     def _commanded(self, end: int, wall: Wall, members: int) -> Commanded:
-        """Returns the part of the rows kept that books need; the latest row is of tick ``end - 1``."""
+        """Returns what the books need of the rows kept; the latest row is of tick ``end - 1``."""
         rows = self.rows
         forces = {"wall": rows_of([row.columns["wall"] for row in rows], members)}
         for book in sorted({book for row in rows for book in row.forces}):
@@ -114,15 +114,15 @@ class BatchLogger:
                 part.select(kept)
 
     def note_accounts(self, elements: Sequence[Any]) -> None:
-        """Takes note that these elements have been at work up to ``tick``."""
+        """Records that these elements have been at work up to ``tick``."""
         note_accounts(self._accounts, elements, self.tick)
 
     def outcomes(self, ends: Sequence[MemberEnd], ended: str, counted: Mapping[str, np.ndarray]) -> Iterator[Summary]:
-        """Yields the entries of the summary of each of these members but for the machine's, as they stand now.
+        """Yields the present summary entries of each of these members, except those of the machine.
 
         Args:
             ended: "done", "stopped" or "diverged".
-            counted: what was counted besides, by name of the counter, shape (members,).
+            counted: further counts by name of the counter, shape (members,) each.
         """
         places = np.array([end.place for end in ends], np.intp)
         measures = self.window.measures(places)
@@ -160,7 +160,7 @@ class BatchLogger:
 
 
 def _column(values: list[Any], members: int) -> np.ndarray:
-    """Returns a number for all members, or one for each, in every row; shape (rows, members), or (rows, 1)."""
+    """Returns rows with one number per member, or one for all members; shape (rows, members), or (rows, 1)."""
     is_shared = not any(getattr(value, "shape", ()) for value in values)
     return np.array(values)[:, None] if is_shared else rows_of(values, members)
 

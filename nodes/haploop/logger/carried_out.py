@@ -1,4 +1,4 @@
-"""Changes that a plant or controller of somebody else's was told of, held against what its blocks show."""
+"""Changes that a foreign plant or controller was told of, compared with what its blocks show."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ _NO_DELAY = (
 class CarriedOut:
     """Finds the swaps and sets that a controller did not carry out, and the delays that a plant did not.
 
-    A change begins a block of the controller, which shows it: the wall as it is from then on, the elements with their
-    parameters. A delay is seen in the plant's column ``command``: that of the change's tick acts so much later.
+    A change begins a new block of the controller, which shows it: the wall from then on, and the elements with their
+    parameters. A delay shows in the plant's column ``command``: the command of the change's tick acts that much later.
 
     Args:
-        foreign: the roles that are somebody else's.
+        foreign: the roles taken by foreign programs.
 
     Attributes:
-        awaited: ticks of changes found refused, whose event has not come back from the clock.
+        awaited: ticks of changes found refused, whose event has not yet come back from the clock.
     """
 
     def __init__(self, scene: Scene, time: Timebase, foreign: Collection[str] = ("plant", "controller")) -> None:
@@ -44,7 +44,7 @@ class CarriedOut:
         self._waiting: list[Change] = []
         self._blocks: list[Message] = []
         self._looked = 0
-        # What is late or lost on the way acts at other steps than the delay's.
+        # With jitter or loss, commands act at other steps than the delay gives.
         is_told = "plant" in foreign and not (scene.jitter or scene.loss)
         self._delays = Delays(time, time.window_ticks(scene.run) // 2) if is_told else None
 
@@ -65,7 +65,7 @@ class CarriedOut:
             self._delays.blocks.append((block["from_tick"], as_float64(block["columns"]["command"])[:-1]))
 
     def note(self, tick: int, event: Event) -> None:
-        """Takes an event of the clock; a change that the controller refused itself is waited for no more."""
+        """Takes an event of the clock; a change that the controller itself refused is no longer waited for."""
         if is_change(event):
             self._waiting.append(Change.from_dict(tick, event))
             if self._delays and DELAY in self._waiting[-1].set:
@@ -100,7 +100,7 @@ class Delays:
     """Finds the sets of the delay that a plant did not carry out.
 
     Args:
-        most_held: ticks that the clock may be kept waiting for a change to be seen.
+        most_held: for how many ticks, at most, the clock may be kept waiting for a change to be seen.
     """
 
     def __init__(self, time: Timebase, most_held: int) -> None:
@@ -146,7 +146,7 @@ def _why(change: Change) -> str:
 
 
 def _shows(block: Message, change: Change, after: Scene) -> bool:
-    """Tells whether a block shows what a change touches as it is in the scene after it."""
+    """Tells whether a block shows what a change touches in the same way as the scene after the change."""
     elements, wall = block["elements"], block["wall"]
     if [element["kind"] for element in elements] != [element.name for element in after.dissipation]:
         return False

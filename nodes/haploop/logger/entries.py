@@ -1,7 +1,7 @@
-"""Meanings of the entries of ``summary.json`` that the logger writes by itself, by dotted key.
+"""Meanings of the entries of ``summary.json`` that the logger writes itself, by dotted key.
 
-N stands for a place in a list, NAME for a name that the scene or the machine gives. What has a type of its own,
-such as ``window``, says it there.
+N stands for a place in a list, NAME for a name that the scene or the machine gives. Entries with a type of their own,
+such as ``window``, are explained there.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Telemetry of a plant or controller that is not haploop's own: checked before it is booked."""
+"""Checks of the telemetry of a plant or controller that is not haploop's own, before it is booked."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from haploop.protocol.walls.registry import class_of, parameters_of
 
 _PLANT = ("x", "v", "x_low", "force", "command")
 _CONTROLLER = ("x", "v", "a", "wall", "total", "in_contact")
-# Where the device is, as told by the plant, or measured: without it nothing is known.
+# Where the device is, as reported by the plant, or measured: without it nothing is known.
 _MOTION = ("x", "v")
 _STATE = ("tick", "x", "v", "force", "command")
 _ELEMENT = {"book": int, "kind": str, "parameters": dict, "from_tick": int}
 
 
 def complaint(frame: Frame, role: str, scene: Scene, time: Timebase) -> str:
-    """Returns what is wrong with a STATE or a block of one of these, as a sentence; "" for nothing."""
+    """Returns what is wrong with a STATE or block of a foreign plant or controller, as a sentence; "" for nothing."""
     message = frame.as_dict()
     if frame.name not in ("STATE", "END", f"{role.upper()}_BLOCK"):
         return f"{frame.name} is no telemetry of a {role}, but came from it."
@@ -40,7 +40,7 @@ def complaint(frame: Frame, role: str, scene: Scene, time: Timebase) -> str:
 
 
 def plant_columns(scene: Scene) -> tuple[str, ...]:
-    """Returns the columns without which the books of a scene's plant know less than what moves."""
+    """Returns the columns without which the books of a scene's plant do not know all that moves."""
     chain, friction = Chain.from_scene(scene), ("friction", "stuck") if scene.friction else ()
     lows = (f"{name}_low" for name in chain.positions)
     return tuple(dict.fromkeys((*_PLANT, *chain.states, *lows, *friction)))

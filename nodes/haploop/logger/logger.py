@@ -31,14 +31,14 @@ class Logger:
     """Keeps the books of a run from the blocks of plant and controller, in whichever order they come.
 
     Args:
-        scene, time: the resolved scene and its integers.
+        scene, time: the resolved scene and its timebase.
         channels: where to write, or None to keep books only.
 
     Attributes:
-        time: the integers of the run.
+        time: the timebase of the run.
         tick: every interval before it is booked.
-        foreign: roles that programs of others have taken.
-        booked: called with the first of some ticks and the running books at each, name -> array, once they are booked.
+        foreign: roles taken by foreign programs.
+        booked: called once some ticks are booked, with the first of them and the running books at each, name -> array.
     """
 
     def __init__(self, scene: Scene, time: Timebase, channels: Channels | None) -> None:
@@ -60,10 +60,10 @@ class Logger:
         self._began = wall_clock.perf_counter()
 
     def start(self, plant: dict[str, float], history: list[Block], controller_tick: int = 0) -> None:
-        """Begins with the plant's state and, when joining a run, the controller's last blocks.
+        """Starts from the plant's state and, when joining a run, the controller's last blocks.
 
         Args:
-            controller_tick: where the controller's blocks to come begin if it has sent none.
+            controller_tick: tick at which the controller's blocks will begin if it has sent none.
         """
         self.count_wall_time()
         known = history[-1]["from_tick"] + history[-1]["ticks"] if history else 0
@@ -92,7 +92,7 @@ class Logger:
         note_accounts(self._accounts, block["elements"], block["from_tick"] + block["ticks"])
 
     def event(self, tick: int, event: Event) -> None:
-        """Takes note of something that changes the run at ``tick``; it is logged once the books get there."""
+        """Records an event that changes the run at ``tick``; it is logged once the books reach that tick."""
         self._not_made += [event[kind] for kind in ("refused", "restored") if kind in event]
         insort(self._events, (tick, event), key=lambda item: item[0])
         self._log_events()
@@ -107,12 +107,12 @@ class Logger:
     def _book_common(self) -> None:
         """Books the intervals of which both sides are known, block by block of the controller.
 
-        Cutting only where elements change makes the log's columns independent of how telemetry was cut. One that joins
-        begins where no command is in effect any more that is older than what it knows of the controller.
+        Cutting only where elements change makes the log's columns independent of how telemetry was cut. A logger that
+        joins a run begins where no command older than the controller rows it knows is still in effect.
         """
         if not self._started and self._plant.end > self._plant.tick:
             self.tick = self._first_tick = max(self.tick, self._plant.first_tick_from(self._controller.first))
-        if self._started or self._bookable > self.tick:  # one that joins knows its first tick only now
+        if self._started or self._bookable > self.tick:  # a logger that joins knows its first tick only now
             self._log_controller()
         while (end := self._bookable) > self.tick:
             self._book(end)
@@ -122,13 +122,13 @@ class Logger:
         return min(self._plant.end, self._controller.part_end(self.tick))
 
     def _log_controller(self) -> None:
-        """Logs what has come of the controller, before the plant: a log cut off anywhere can be replayed."""
+        """Logs what has come from the controller, before the plant: a log cut off anywhere can be replayed."""
         blocks, self._unlogged = self._unlogged, []
         for block in blocks:
             if self._channels:
                 self._channels.controller(block, self._first_tick)
 
-    @np.errstate(over="ignore", invalid="ignore")  # where a force is no finite number, its books are none either
+    @np.errstate(over="ignore", invalid="ignore")  # where a force is not finite, its books are not finite either
     def _book(self, end: int) -> None:
         if self._plant.tick < self.tick:
             self._plant.take(self.tick)
@@ -156,7 +156,7 @@ class Logger:
         self._log_events()
 
     def _named(self, rows: np.ndarray) -> dict[str, np.ndarray]:
-        """Returns the running books by names for people: an element's by its kind, numbered where a kind recurs."""
+        """Returns the running books by readable names: an element's by its kind, numbered where a kind recurs."""
         names = [self._account_name(name) for name in self.books.names]
         return dict(zip(names, rows, strict=True)) | self.books.residuals(rows)
 
@@ -169,7 +169,7 @@ class Logger:
         return f"{kind}{f'-{number}' if number > 1 else ''}{dot}{side}"
 
     def end(self) -> None:
-        """Writes the end state, and what the controller sent though nothing was booked; call once, at the end."""
+        """Writes the end state, and what the controller sent even if nothing was booked; call once, at the end."""
         self._log_controller()
         if self._channels:
             self._channels.plant_end(self.tick, self._end_state)
@@ -179,9 +179,9 @@ class Logger:
 
         Args:
             failed: why the run failed, "" if it did not.
-            reason: why the plant ended the run by itself, or None.
-            trouble: which element gave a force that is no finite number, or None.
-            telemetry_gaps: ticks whose telemetry did not come.
+            reason: why the plant itself ended the run, or None.
+            trouble: which element gave a force that is not finite, or None.
+            telemetry_gaps: ticks whose telemetry did not arrive.
         """
         why = failed or "; ".join(part for part in (trouble, reason) if part)
         is_complete = self.tick >= self.time.ticks
@@ -221,8 +221,8 @@ class Logger:
         return outcome(self._scene, ran, self._measured(), diverged, self._changed_s) | {"energy": energies} | told
 
     def _balance(self) -> dict[str, str]:
-        """Returns what the books leave unexplained as the sentence ``balance``, where it is worth one."""
-        # A crude integrator of our own makes energy, too: then it need not be the controller.
+        """Returns the sentence ``balance`` on what the books leave unexplained, where it is worth one."""
+        # haploop's own crude integrators generate energy, too: then the cause need not be the controller.
         may_be = {*self.foreign, *["plant"] * (self._scene.clock.integrator != "exact")} if self.foreign else ()
         words = balance_words(unexplained_J(self.books.state), moved_J(self.books.state), may_be)
         return {"balance": words} if words else {}
@@ -240,7 +240,7 @@ class Logger:
         return None if tick is None else tick / self.time.control_rate
 
     def status(self) -> Message:
-        """Returns where the run is and its measures, for progress lines and viewers."""
+        """Returns the time that the run has reached and its measures, for progress lines and viewers."""
         if self.tick == self._first_tick:
             return {}
         measures, books, changed_s = self._measured(), self.books.state, self._changed_s

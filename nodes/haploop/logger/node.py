@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
 ROLE = "logger"
 _LISTENS = ("plant", "controller")
-# How often books go out to viewers and the verdict is judged anew, at most.
+# Shortest interval at which books go out to viewers and the verdict is judged again.
 _STATUS_S = 0.1
-# So long another logger waits for the states from which it goes on, s.
+# How long another logger waits for the states from which it continues, s.
 _STATE_S = 15.0
-# So long a last block that was sent may be on its way.
+# How long a last block that was sent may be on its way.
 _LAST_MS = 100
 _NO_STATE = (
     "No STATE of the {} came within {:g} s: it answers no second subscription, which ZeroMQ hands to it only with "
@@ -44,12 +44,12 @@ _NO_STATE = (
 
 
 class LoggerNode:
-    """Takes every block there is; its progress bounds how far the loop may run ahead.
+    """Takes every block there is; its progress limits how far the loop may run ahead.
 
     The run's own logger is one; any number of others may join later, each with a directory of its own.
 
     Args:
-        leave: asked at every turn: None to stay, why it is no use to stay, or "" to go in order.
+        leave: called in every cycle; returns None to stay, why it is useless to stay, or "" to leave in order.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class LoggerNode:
         return self.session.logger.tick
 
     def start(self, welcome: Message, out: Path) -> None:
-        """Subscribes to plant and controller, takes their state, and reports to be ready."""
+        """Subscribes to plant and controller, takes their state, and reports that it is ready."""
         self.out = out
         self._streams = Subscriber(self._context, {role: welcome["endpoints"][role] for role in _LISTENS})
         for path in welcome["context"].get("brings", ()):
@@ -128,12 +128,12 @@ class LoggerNode:
             idle = not poller.poll(REPORT_MS)
             if not self._client.until:  # the run has not begun
                 self.session.logger.count_wall_time()
-            if idle or self._client.is_quiet:  # blocks of one alone bring no tick further
+            if idle or self._client.is_quiet:  # blocks of only one of them complete no tick
                 self._client.waiting(self._tick, self._awaited)
             self._drain()
             self._client.poll()
             self._note_events()
-            if (why := self._leave()) is not None and (idle or not why):  # what still comes is taken first
+            if (why := self._leave()) is not None and (idle or not why):  # what still arrives is taken first
                 return self.finish(why)
             if self._carried_out:
                 self._report_refusals(self._carried_out)
@@ -148,7 +148,7 @@ class LoggerNode:
         return self.finish("")
 
     def _demand_all_blocks(self) -> None:
-        """Fails the run where a program of somebody else's has ended without having sent all of its blocks."""
+        """Fails the run if a foreign program has ended without having sent all of its blocks."""
         end = min(tick for tick, *_ in self._ended.values())
         if self._tick < end:
             why = f"The {self._streams.slowest} has ended at tick {end}, but its blocks reach tick {self._tick} only."
@@ -156,14 +156,14 @@ class LoggerNode:
 
     @property
     def _awaited(self) -> str:
-        """Whom this waits for, and for what of it where nothing else is missing."""
+        """The role that this logger waits for, and for what from it where nothing else is missing."""
         missing = [role for role in _LISTENS if role not in self._ended]
         is_at_end = len(missing) == 1 or (self._client.last and self._tick >= self._client.until)
         return f"{missing[0]}'s END" if missing and is_at_end else self._streams.slowest
 
     @property
     def _reached(self) -> int:
-        """The tick up to which all is booked, and all changes were looked for."""
+        """The tick up to which everything is booked and all changes were looked for."""
         return int(min(self._tick, self._carried_out.tick)) if self._carried_out else self._tick
 
     @property
@@ -177,7 +177,7 @@ class LoggerNode:
             self._client.progress(self._reached, self._status | (refusals_as_status(refused) or {}))
 
     def _drain(self, wait_ms: int = 0) -> bool:
-        """Takes what has come, or comes within a time; tells whether that was anything."""
+        """Takes what has arrived, or arrives within ``wait_ms``; tells whether there was anything."""
         came = self._streams.receive(wait_ms) if wait_ms else self._streams.drain()
         for role, frame in came:
             self._check(role, frame)
@@ -191,7 +191,7 @@ class LoggerNode:
         return bool(came)
 
     def _check(self, role: str, frame: Frame) -> None:
-        """Looks through what a program of somebody else's has sent.
+        """Checks what a foreign program has sent.
 
         Raises NodeError where it cannot be booked.
         """
@@ -235,7 +235,7 @@ class LoggerNode:
             self._publisher.publish("ENERGY_BLOCK", first, self._tick - first, columns, self._status)
 
     def save(self, failed: str) -> Summary | None:
-        """Finishes because of what ``failed`` says, with the blocks that were sent; None if nothing has begun."""
+        """Finishes for the reason in ``failed``, with the blocks that were sent; returns None if nothing has begun."""
         if not self._started:
             return None
         with contextlib.suppress(TelemetryGap, NodeError):

@@ -15,7 +15,7 @@ from haploop.protocol.transport.machine import MACHINE, Machine
 from haploop.protocol.transport.wire import Message
 
 LOG = "log.mcap"
-# The log is at most this far behind on disk, in wall time.
+# The log on disk is at most this far behind, in wall time.
 _FLUSH_S = 0.4
 
 
@@ -33,7 +33,7 @@ class LogSession:
         self.programs: Message = {}
 
     def flush_when_due(self) -> None:
-        """Hands the log to the operating system if the last time is too long ago."""
+        """Hands the log to the operating system if that was last done too long ago."""
         now = self._machine.now()
         if self._log and now >= self._flush_due:
             self._log.flush()
@@ -60,15 +60,15 @@ def open_session(
     memory: MemoryLog | None = None,
     machine: Machine = MACHINE,
 ) -> LogSession:
-    """Makes a logger with its files in directory ``out``, or without any when None.
+    """Makes a logger with its files in directory ``out``, or without files if that is None.
 
     Args:
         scene: the resolved scene; ``run.log`` decides what is logged.
         attachments: text files to put into the log, by name (the scene as TOML, plugins).
-        memory: where to log without a directory; when None, only the books are kept then.
+        memory: where to log without a directory; if None, only the books are kept then.
 
     Raises:
-        LogError: the log cannot be made.
+        LogError: the log cannot be created.
     """
     detail = scene.run.log
     file = Log(out / LOG, machine=machine) if out and detail != "none" else None

@@ -1,4 +1,4 @@
-"""The summary of a run: the figures people and programs ask for."""
+"""The summary of a run: the figures that people and programs ask for."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SUMMARY = "summary.json"
 Summary = dict[str, Any]
 # Entries that differ between two runs of the same scene.
 OF_THE_MACHINE = ("wall_s", "real_time_factor", "lateness", "versions")
-# Runs of processes that are longer, in simulated seconds, are not gone through again for their verdict.
+# Runs of processes that are longer than this, in simulated seconds, are not repeated for their verdict.
 REPEATED_S = 60.0
 _FINITE = (str, int, bool)
 
@@ -44,7 +44,7 @@ class Account(NamedTuple):
 
 
 def note_accounts(accounts: dict[int, Account], elements: Iterable[Description], to_tick: int) -> None:
-    """Notes by book that these elements, as telemetry describes them, have been at work up to a tick."""
+    """Records by book that these elements, as telemetry describes them, have been at work up to a tick."""
     for element in elements:
         book, first = element["book"], element["from_tick"]
         known = accounts.get(book) or Account(book, element["kind"], element["parameters"], first, to_tick)
@@ -52,23 +52,24 @@ def note_accounts(accounts: dict[int, Account], elements: Iterable[Description],
 
 
 def versions() -> dict[str, str]:
-    """Returns the versions of what the run was made with."""
+    """Returns the versions of the software that the run was made with."""
     return {**_packages(), "python": platform.python_version()}
 
 
 @cache
 def _packages() -> dict[str, str]:
-    """Returns the versions of packages; each is searched for among all that are installed, 1 ms or more."""
+    """Returns the versions of packages; each is searched for among all installed ones, which takes 1 ms or more."""
     from importlib.metadata import version  # which takes a tenth of the logger's start
 
     return {name: version(name) for name in ("haploop", "numpy", "pyzmq", "msgpack")}
 
 
 def energy(books: BooksState, accounts: Sequence[Account], has_wall: bool) -> Summary:
-    """Returns the ``energy`` entry: every book as it stands; arrays over the members where the books are of a batch.
+    """Returns the ``energy`` entry: the total of every book so far; arrays over the members if the books are a batch's.
 
-    The wall's leak is its true book less what an ideal wall would hold now (``ideal_J``, against the start), but for
-    what changes of the wall in contact put into it (``changes_J``), and less what its law takes (``dissipated_J``).
+    The wall's leak is its true book, less what an ideal wall would hold now (``ideal_J``, relative to the start),
+    without what changes of the wall in contact put into it (``changes_J``), and less what its law takes
+    (``dissipated_J``).
     """
 
     def pair(account: str | int) -> Summary:
@@ -103,11 +104,11 @@ def energy(books: BooksState, accounts: Sequence[Account], has_wall: bool) -> Su
 def outcome(
     scene: Scene, ran: Summary, measures: RunMeasures, diverged: str | None, changed_s: float | None = None
 ) -> Summary:
-    """Returns the entries of ``summary.json`` but for energies: what was run, the verdict and what it rests on.
+    """Returns the entries of ``summary.json`` except energies: what was run, the verdict and what it rests on.
 
     Args:
-        ran: duration_s, ticks, steps, ended, final, lost and what else was counted, trajectory_sha256.
-        diverged: why the plant ended by itself, or None.
+        ran: duration_s, ticks, steps, ended, final, lost and other counts, trajectory_sha256.
+        diverged: why the plant itself ended the run, or None.
         changed_s: when the loop was last changed within the window, or None.
     """
     verdict = measures.verdict(diverged, measures.untold(ran["ticks"], ran["ended"], changed_s))
@@ -127,10 +128,10 @@ def outcome(
 
 
 def awaits_verdict(scene: Scene, summary: Summary) -> bool:
-    """Tells whether the summary of a run of processes has the word of its window only until its launcher has judged it.
+    """Tells whether the summary of a run of processes has its window's word only until the launcher has judged the run.
 
-    A loop is judged where its scene asks for that, and its run ended by itself and was not too long to be repeated. One
-    of which a half was a program of somebody else's is not: copies of our own would say nothing of it.
+    A loop is judged if its scene asks for that, and its run ended by itself and was not too long to be repeated. A loop
+    with a foreign plant or controller is not judged: copies of haploop's own would say nothing about it.
     """
     if "programs" in summary:
         return False
@@ -138,12 +139,12 @@ def awaits_verdict(scene: Scene, summary: Summary) -> bool:
     return scene.run.verdict == "pushed" and by_itself and "stability" not in summary
 
 
-# Key of the checksum in summary.json: CRC-32 of all else in it.
+# Key of the checksum in summary.json: CRC-32 of everything else in it.
 _CHECKSUM = "checksum"
 
 
 def write(summary: Summary, path: Path, machine: Machine = MACHINE) -> None:
-    """Writes as JSON, in one piece: a reader never sees half a file. Numbers that are not finite become null."""
+    """Writes a summary as JSON, in one piece: a reader never sees half a file. Non-finite numbers become null."""
     temporary = path.with_suffix(".part")
     content = finite(summary)
     text = json.dumps({**content, _CHECKSUM: _checksum(content)}, indent=2)
@@ -161,7 +162,7 @@ def _checksum(content: Summary) -> str:
 
 
 def read(path: Path) -> Summary:
-    """Returns what ``write`` wrote; LogError where the file cannot be read, or holds something else."""
+    """Returns what ``write`` wrote; raises LogError where the file cannot be read, or holds something else."""
     why = "it is damaged"
     try:
         summary = json.loads(read_text(path))
@@ -177,10 +178,10 @@ def read(path: Path) -> Summary:
 
 
 def misfit(found: Any, expected: Any, at: str = "") -> str:
-    """Returns the dotted key at which a summary is not of the expected types; "" for nowhere.
+    """Returns the dotted key of the first entry of a summary that is not of the expected type; "" if there is none.
 
     Args:
-        expected: a type or several, a table of such by key, or a list of the one that every entry is.
+        expected: a type or several, a mapping of such by key, or a list of the one that every entry must be.
     """
     if isinstance(expected, Mapping):
         if not isinstance(found, dict):
@@ -196,7 +197,7 @@ def misfit(found: Any, expected: Any, at: str = "") -> str:
 
 
 def write_summary(summary: Summary, out: Path, machine: Machine = MACHINE) -> None:
-    """Writes the summary into the directory of its run; LogError where that fails."""
+    """Writes the summary into the directory of its run; raises LogError where that fails."""
     try:
         write(summary, out / SUMMARY, machine)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The balance of the books: how they stand, what they leave over, and in words what that makes of a plant."""
+"""The balance of the books: their totals, what they leave unexplained, and a sentence on what that says of a plant."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 from haploop.logger.books.work import CLOSING, Sums
 from haploop.protocol.walls.wall import Wall
 
-# A residual is told in words beyond this share of the energy that moved.
+# A residual above this share of the energy that moved is reported in words.
 _TOLD = 1e-3
-# Whose doing it is and on which condition, by the roles that programs of others had: the books rest on what plant and
-# controller tell, and on the scene.
+# What causes the residual, and on which condition, by the roles of foreign programs: the books rest on what plant and
+# controller report, and on the scene.
 _IF = ", if its device and hand are those of the scene"
 _WHOSE = {
     (): ("This plant", ""),
@@ -25,15 +25,15 @@ _WHOSE = {
 
 
 class BooksState(NamedTuple):
-    """All that books remember; in a batch, arrays have the members as their last axis.
+    """The complete state of the books; in a batch, arrays have the members as their last axis.
 
     Attributes:
         names: the books, in the order of the rows of the sums: the plant's, the causes of the wall's leak where there
             is a wall, ``moved``, then ``<b>.sampled`` and ``<b>.true`` for the wall and for every element's book b.
-        sums: how they stand, J.
+        sums: their totals so far, J.
         stored_at_start_J: kinetic and spring energy at the start.
-        wall: as it stood where the last intervals were booked; None before the first.
-        wall_changes_J: what changes of the wall in contact would have put into an ideal one.
+        wall: as it was in the intervals booked last; None before the first.
+        wall_changes_J: energy that changes of the wall in contact would have put into an ideal one.
     """
 
     names: tuple[str, ...]
@@ -43,13 +43,13 @@ class BooksState(NamedTuple):
     wall_changes_J: Any
 
 
-# How books count in the balance: what the hand gave less what is elsewhere.
+# Signs of the books in the balance: what the hand gave, less what is elsewhere.
 _SIGNS = {"kinetic": -1.0, "spring": -1.0, "actuator": -1.0}
 _ENDINGS = {"_work": 1.0, "_heat": -1.0, ".true": -1.0}
 
 
 def balance_sign(name: str) -> float:
-    """Returns 0 for a book that is no part of the balance."""
+    """Returns the sign of a book in the balance; 0 for a book that is not part of it."""
     return _SIGNS.get(name) or next((sign for ending, sign in _ENDINGS.items() if name.endswith(ending)), 0.0)
 
 
@@ -59,7 +59,7 @@ def balance(names: Sequence[str]) -> list[tuple[float, int]]:
 
 
 def total_J(state: BooksState, name: str) -> Any:
-    """Returns one book as it stands, J; shape (batch,) for a batch."""
+    """Returns the total of one book so far, J; shape (batch,) for a batch."""
     row = state.names.index(name)
     total = state.sums.sums[row] + state.sums.errors[row]
     return total if total.shape else float(total)
@@ -76,15 +76,15 @@ def moved_J(state: BooksState) -> Any:
 
 
 def residual_J(state: BooksState) -> Any:
-    """Returns what the books leave unexplained, in magnitude, J; None where one book is what closes the balance."""
+    """Returns the magnitude of what the books leave unexplained, J; None where one book closes the balance."""
     unexplained = unexplained_J(state)
     return None if unexplained is None else abs(unexplained)
 
 
 def unexplained_J(state: BooksState) -> Any:
-    """Returns what the books leave unexplained, J: above 0 what got lost, below 0 what came from nowhere.
+    """Returns the energy that the books leave unexplained, J: positive if lost, negative if it came from nowhere.
 
-    Infinite where a book is no finite number; None where one book is what closes the balance.
+    It is infinite where a book is not finite, and None where one book closes the balance.
     """
     if CLOSING in state.names:
         return None
@@ -99,12 +99,12 @@ def _sum_exactly(parts: list[float]) -> float:
 
 
 def balance_words(unexplained_J: float | None, moved_J: float, foreign: Collection[str] = ()) -> str:
-    """Returns what the books of a run leave unexplained, as a sentence; "" where it is nothing worth a word.
+    """Returns a sentence on what the books of a run leave unexplained; "" where it is too little to mention.
 
     Args:
-        unexplained_J: above 0 what got lost, below 0 what came from nowhere; None where none is claimed.
+        unexplained_J: positive if lost, negative if it came from nowhere; None where no figure is claimed.
         moved_J: energy that changed its place.
-        foreign: roles that were taken by programs of others, or may make energy beside them.
+        foreign: roles taken by foreign programs, and those that may generate energy beside them.
     """
     if unexplained_J is None or not math.isfinite(unexplained_J) or not abs(unexplained_J) > _TOLD * moved_J:
         return ""

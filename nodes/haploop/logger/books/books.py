@@ -47,11 +47,11 @@ class Books:
     sampled  E += -f[k-1] (x_m[k] - x_m[k-1]) at tick k, all the controller can know (Choi et al. 2022, eq. 4)
     true     E += -f_applied (x[s+1] - x[s]) at every plant step: exact, since the applied force is held
     The residual is hand work - heats - change of stored energy - all true books. ``moved`` is the energy that changed
-    its place: half of the sum of all changes in magnitude (each joule leaves one book and enters another), and the
-    energy stored at the start.
+    its place: half of the sum of the magnitudes of all changes (each joule leaves one book and enters another), plus
+    the energy stored at the start.
 
     Args:
-        members: of the batch; None for one run, whose arrays have no axis for members.
+        members: number of members of the batch; None for one run, whose arrays have no axis for members.
     """
 
     def __init__(self, scene: Scene, time: Timebase, members: int | None = None) -> None:
@@ -69,7 +69,7 @@ class Books:
         return self.state.names
 
     def sum_by(self, loops: BatchSums) -> None:
-        """Has the books of a batch summed by loops to the same bits; call before anything is booked."""
+        """Lets ``loops`` sum the books of a batch, with bit-identical results; call before anything is booked."""
         self._displacement, self._add_ticks = loops.displacement, loops.add_ticks
         if isinstance(self.plant, OneMassBooks):
             self.plant.energies = loops.energies
@@ -79,7 +79,7 @@ class Books:
         self.state = self.state._replace(names=all_names, sums=with_rows(self.state.sums, len(all_names)))
 
     def start(self, plant: dict[str, np.ndarray]) -> None:
-        """Begins with the plant in the first state of its first columns."""
+        """Starts the books with the plant in the first state of its first columns."""
         self.state = self.state._replace(stored_at_start_J=self.plant.stored_J(plant))
 
     def book(self, tick: int, plant: dict[str, np.ndarray], commanded: Commanded) -> np.ndarray:
@@ -89,8 +89,8 @@ class Books:
             plant: telemetry columns of the plant, shape (ticks * n + 1,) each.
 
         Returns:
-            The books as they stand at each of these ticks, shape (rows, ticks), rows as ``names``: true and plant books
-            up to the tick's step, sampled books with the tick's sample.
+            The totals of the books at each of these ticks, shape (rows, ticks), rows as ``names``: true and plant books
+            up to the tick's step, sampled books including the tick's sample.
         """
         flows = self._flows(tick, plant, commanded)
         sums, totals = add_columns(self.state.sums, np.stack(flows))
@@ -130,7 +130,7 @@ class Books:
         none: np.ndarray = np.zeros_like(way.by_tick)
         for account, force in forces.items():
             work = sampled_work(commanded.x_m[known], force[known][:-1])
-            # Nothing is sampled at the first tick there is.
+            # The very first tick has no sampled work.
             flows[f"{account}.sampled"] = work if len(work) == ticks else np.concatenate([none[:1], work])
         return [flows.get(name, none) for name in self.state.names]
 
@@ -177,7 +177,7 @@ class Books:
     def residuals(self, at_ticks: np.ndarray) -> dict[str, np.ndarray]:
         """Returns the signed ``residual`` at each tick from the rows that ``book`` returned, shape (ticks,), J.
 
-        Where one book is what closes the balance there is none.
+        Where one book closes the balance, the result is empty.
         """
         if CLOSING in self.state.names:
             return {}
@@ -185,10 +185,10 @@ class Books:
 
 
 def plant_books(scene: Scene, time: Timebase, members: int | None = None) -> PlantBooks:
-    """Returns the books of a scene's plant: one mass under held forces, a chain of bodies, or a device in some hand.
+    """Returns the books of a scene's plant: one mass under held forces, a chain, or a device in an unmodelled hand.
 
-    Their integrals are those of the exact motion from each recorded state on. Where ``clock.integrator`` is another,
-    what its next state has more or less is in no book: the residual is then the energy error of the method.
+    Their integrals are those of the exact motion from each recorded state on. With another ``clock.integrator``, the
+    energy by which its next state differs is in no book: the residual is then the energy error of the method.
     """
     if hand_is_unmodelled(scene):
         from haploop.logger.books.closing import ClosingBooks

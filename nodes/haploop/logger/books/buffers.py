@@ -1,4 +1,4 @@
-"""Telemetry of plant and controller, laid side by side so that whole intervals can be booked."""
+"""Telemetry of plant and controller, aligned so that whole intervals can be booked."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from haploop.protocol.transport.telemetry import Block
 from haploop.protocol.walls.registry import parameters_of
 from haploop.protocol.walls.wall import Spring, Wall
 
-# Columns of pieces of steps have a row for each piece, in order; ``pieces.step`` says of which step it is.
+# Columns of pieces of steps have a row for each piece, in order; ``pieces.step`` says to which step it belongs.
 PIECES = "pieces."
 
 
@@ -28,7 +28,7 @@ def _check(block: Block, role: str, end: int) -> None:
 
 
 class PlantBuffer:
-    """Plant states at every step from ``tick`` on; the last state is the start of what comes next."""
+    """Plant states at every step from ``tick`` on; the last state is the start of the next interval."""
 
     def __init__(self, steps_per_tick: int, tick: int) -> None:
         self._steps = steps_per_tick
@@ -42,18 +42,18 @@ class PlantBuffer:
         for name, data in block["columns"].items():
             new = as_float64(data)
             rows = None if name.startswith(PIECES) else keep
-            kept = self._columns.get(name, np.zeros(rows or 0))  # what begins to be counted was 0 before
+            kept = self._columns.get(name, np.zeros(rows or 0))  # a count that starts now was 0 before
             self._columns[name] = np.concatenate([kept[:rows], new])
         self.end += block["ticks"]
 
     def first_tick_from(self, command: int) -> int:
-        """Returns the first tick from which on every command in effect is ``command`` or later; or none has come."""
+        """Returns the first tick from which on the command in effect, if any, is ``command`` or a later one."""
         in_effect = self._columns["command"][:-1]
         older = np.flatnonzero((in_effect >= 0) & (in_effect < command))
         return self.tick + (int(older[-1]) // self._steps + 1 if len(older) else 0)
 
     def take(self, tick: int) -> dict[str, np.ndarray]:
-        """Returns the states of the intervals before ``tick``, end state included; what comes from there on stays."""
+        """Returns the states of the intervals before ``tick``, end state included; keeps those from ``tick`` on."""
         rows = (tick - self.tick) * self._steps
         pieces = int(np.searchsorted(self._columns.get(f"{PIECES}step", ()), tick * self._steps))
         cuts = {name: (pieces, pieces) if name.startswith(PIECES) else (rows + 1, rows) for name in self._columns}
@@ -69,7 +69,7 @@ class Commanded(NamedTuple):
     Attributes:
         x_m: positions as measured, shape (rows,), m.
         forces: of the wall, by the name "wall", and of every element's book, shape (rows,) each, N.
-        wall: as it stands in all intervals booked.
+        wall: as it is in all intervals booked.
     """
 
     first: int
@@ -79,10 +79,10 @@ class Commanded(NamedTuple):
 
 
 class ControllerBuffer:
-    """Controller rows of one run by tick, with every book's force and the wall as it stood.
+    """Controller rows of one run by tick, with every book's force and the wall of the time.
 
     Args:
-        wall: class of the scene's.
+        wall: class of the scene's wall.
 
     Attributes:
         columns: x, v, a, wall, total, in_contact, the wall's numbers (wall_position, ...); shape (end - first,) each.
@@ -117,7 +117,7 @@ class ControllerBuffer:
         self._part_ends.append(self.end)
 
     def part_end(self, tick: int) -> int:
-        """Returns where the block that holds ``tick`` ends: up to there the elements are the same."""
+        """Returns the end of the block that holds ``tick``; up to there the elements are the same."""
         return next((end for end in self._part_ends if end > tick), self.end)
 
     def rows(self, name: str, first: int, end: int) -> np.ndarray:
@@ -125,16 +125,16 @@ class ControllerBuffer:
         return self.columns[name][first - self.first : end - self.first]
 
     def commanded(self, tick: int, end: int) -> Commanded:
-        """Returns what books need of the intervals ``tick`` ... ``end - 1``, without elements that come later."""
+        """Returns what the books need for the intervals ``tick`` ... ``end - 1``, without elements that start later."""
         forces = {str(book): force for book, force in self.forces.items() if self._opened[book] < end}
         stood = {name: float(self.rows(f"wall_{name}", tick, end)[0]) for name in self._of_wall}
         wall = self._wall(inward=self._inward, **stood)
         return Commanded(self.first, self.columns["x"], {"wall": self.columns["wall"]} | forces, wall)
 
     def forget_before(self, tick: int, command: int) -> None:
-        """Drops the rows before the last tick and before ``command``, in effect then, and books with no force left.
+        """Drops rows older than ``tick - 1`` and ``command``, the one in effect then, and books with no force left.
 
-        A book that opens from ``tick`` on stays even without a force, so that it opens at its own tick.
+        A book that opens at ``tick`` or later stays even without a force, so that it opens at its own tick.
         """
         drop = max(0, min(tick - 1, command) - self.first)
         if drop:

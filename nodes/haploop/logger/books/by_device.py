@@ -1,4 +1,4 @@
-"""The books of a batch with friction whose members are of several devices: those of each device by themselves."""
+"""The books of a batch with friction whose members have several devices: one set of books for each device."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_map, tree_take
 
-# (members that have any, how many each, columns of all of them); see ``BatchFrictionMotion.take_record``.
+# (members that have pieces, how many each has, columns of all pieces); see ``BatchFrictionMotion.take_record``.
 Pieces = tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]
 
 
@@ -27,7 +27,7 @@ def books_of_batch(scene: Scene, time: Timebase, members: int) -> ChainBooks | B
 
 
 class BooksByDevice:
-    """``ChainBooks`` of the members of each device, and the members' books put in their order again.
+    """``ChainBooks`` of the members of each device, with the results put back into the order of the members.
 
     Attributes:
         names: the books, in the order in which ``increments`` yields them.
@@ -42,7 +42,7 @@ class BooksByDevice:
         self.names = self._books[0].names
 
     def _places(self) -> Iterator[tuple[int, np.ndarray]]:
-        """Yields each device that is there, and the places of its members."""
+        """Yields each device that occurs, and the places of its members."""
         for device in np.unique(self._device).tolist():
             yield device, np.flatnonzero(self._device == device)
 
@@ -81,14 +81,14 @@ def _by_member(columns: BatchColumns) -> BatchColumns:
 
 
 def _shared_where_alike(leaf: Any) -> Any:
-    """Returns a number for one that all members have alike."""
+    """Returns a single number in place of an array that has the same value for all members."""
     if not getattr(leaf, "shape", ()) or not (leaf == leaf[:1]).all():
         return leaf
     return leaf[0].item()
 
 
 def _pieces_of(pieces: Pieces, places: np.ndarray) -> Pieces:
-    """Returns those of some members, of which the first has number 0."""
+    """Returns the pieces of the members at ``places``, which are numbered from 0 on."""
     members, counts, columns = pieces
     there = np.isin(members, places)
     rows = np.repeat(there, counts)

@@ -35,10 +35,10 @@ class ChainBooks:
         actuator           (f_commanded - force) dx_0 + integral p' v_0 dt / (2 pi bandwidth)
     The last is what the actuator's limits keep from the device: it feels p = force - p' / (2 pi bandwidth), while the
     true books of wall and elements are those of the forces they commanded. Integrals are forms of the rates at the
-    start (``ChainIntegrals``). Nothing is taken from the balance, so that its residual is a proof.
+    start (``ChainIntegrals``). No book is derived from the balance, so that its residual is a proof.
 
-    In a batch with friction all members have the same chain. Members in which friction cut a step are booked by
-    themselves, one after the other as if they were one run.
+    In a batch with friction all members have the same chain. Members in which friction cut a step are booked
+    separately, one after the other as if they were one run.
 
     Attributes:
         names: the books, in the order in which ``increments`` yields them; heats end in ``_heat``.
@@ -82,7 +82,7 @@ class ChainBooks:
     def _by_loops(
         self, loops: Any, first_step: int, columns: BatchColumns, steps: int, commanded: Iterable[np.ndarray]
     ) -> np.ndarray | None:
-        """Returns the books, tick by tick, by the loops; None where these cannot serve."""
+        """Returns the books tick by tick, computed by the machine-code loops; None where these cannot be used."""
         tau = self._tau.at_steps(first_step, first_step + steps + 1)
         chain, members = self._chain, columns["x"].size // len(columns["x"])
         names = [*chain.states, *(f"{name}_low" for name in chain.positions), "friction", "stuck"]
@@ -118,7 +118,7 @@ class ChainBooks:
         whole = {name: column for name, column in columns.items() if getattr(column, "shape", ()) == shape}
 
         def joined(values: np.ndarray) -> np.ndarray:
-            """Returns a column of all steps of those members, one member after the other; 0 between them."""
+            """Returns a column of all steps of those members, one member after the other, with a 0 between them."""
             column = np.zeros((len(places), rows))
             column[:, : len(values)] = np.broadcast_to(values, (len(values), shape[1]))[:, places].T
             return column.ravel()
@@ -136,7 +136,7 @@ class ChainBooks:
     def _of_run(
         self, first_step: int, columns: Columns, tau: np.ndarray, dx: np.ndarray, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        """Yields the energy each step adds to each book, where all steps of a batch are whole."""
+        """Yields the energy each step adds to each book; in a batch, all steps must be whole."""
         segments, force, steps = Segments.from_columns(self._chain, first_step, columns), columns["force"][:-1], len(dx)
         rise = np.diff(tau, axis=0)[segments.step]
         start = tau[:-1][segments.step] + rise * segments.elapsed

@@ -1,4 +1,4 @@
-"""The books of a device that a hand nobody has modelled moves: what the hand gave is what closes the balance."""
+"""The books of a device moved by an unmodelled hand: what the hand gave is the book that closes the balance."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from haploop.protocol.ticks import Timebase
 
 
 class ClosingBooks:
-    """The books of the device alone by ``names``, in the order in which ``increments`` yields them.
+    """The books of the device alone; ``names`` are in the order in which ``increments`` yields them.
 
-    Only the rows of telemetry are known, not what acts between them: over a plant step h from v to v+ with the way dx,
+    Only the rows of telemetry are known, not what acts between them. Over a plant step h from v to v+ with
+    displacement dx,
     heat of the damper   b h ((v^2 + v v+ + v+^2) / 3 + c (v + v+) / 6 + c^2 / 30),  c = 6 dx / h - 3 (v + v+),
     exact where the velocity is a parabola in time, as it nearly is over a step of any smooth motion.
     """
@@ -31,10 +32,10 @@ class ClosingBooks:
     def increments(
         self, first_step: int, columns: dict[str, np.ndarray], moved: Displacement, commanded: Iterable[np.ndarray]
     ) -> Iterator[np.ndarray]:
-        """Yields the energy each interval adds to each book, J; of the book that closes the balance nothing.
+        """Yields the energy each interval adds to each book, J; 0 for the book that closes the balance.
 
         Args:
-            first_step: not used, since nothing acts by its time.
+            first_step: not used, since no force here depends on time.
             columns: plant telemetry of whole intervals, the end state included; shape (ticks * n + 1,) each.
             commanded: the force of the wall and of every element over each step, shape (ticks * n,).
 
@@ -50,7 +51,7 @@ class ClosingBooks:
         at_ticks = v[::n]
         change = at_ticks[1:] - at_ticks[:-1]
         yield device.mass * change * (at_ticks[:-1] + change * 0.5)
-        yield np.zeros_like(moved.by_tick)  # of the hand's spring, of which there is none
+        yield np.zeros_like(moved.by_tick)  # there is no spring of the hand
         if self._is_limited:
             held = by_interval(columns["force"][:-1], n)
             limited = (by_interval(force, n) for force in commanded)

@@ -8,13 +8,13 @@ from typing import Any
 from haploop.protocol.arrays import where
 from haploop.protocol.walls.wall import Wall
 
-# The walls whose books part the leak into its causes, as ``ideal_walls`` yields them.
+# The walls whose books split the leak into its causes, as ``ideal_walls`` yields them.
 CAUSES = ("ideal", "sampled_and_held", "quantised")
-# What the law of a wall in continuous time takes beside what it stores.
+# What the law of a wall in continuous time takes besides what it stores.
 DISSIPATED = "dissipated"
 # Gauss-Legendre with three nodes on 0 ... 1: exact for polynomials up to the fifth degree.
 _NODES = ((0.5 - 0.15**0.5, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + 0.15**0.5, 5.0 / 18.0))
-# Steps of Newton's method from the chord to where a cubic comes through the surface.
+# Steps of Newton's method from the chord to where a cubic crosses the surface.
 _NEWTON = 3
 
 
@@ -35,12 +35,12 @@ def ideal_walls(wall: Wall, x: Any, v: Any, way: Any, force: Any) -> Iterator[An
     ideal             stored in the wall itself, always there: the change of V(p), p the true penetration
     sampled_and_held  its force at the true position and velocity of the tick, held: what sampling and hold add
     quantised         the force the controller computed, without delay: what quantisation, noise and estimates add
-    The true book adds the delay. Leak = true - ideal - dissipated; its parts are the differences from line to line.
+    The true book adds the delay. Leak = true - ideal - dissipated; its parts are the differences between these lines.
 
     Args:
         x, v: true position and velocity at the ticks and at the end, m and m/s, shape (ticks + 1,).
         way: displacement over each interval, shape (ticks,), m.
-        force: what the controller computed for the wall at these ticks, shape (ticks,), N.
+        force: that the controller computed for the wall at these ticks, shape (ticks,), N.
 
     Yields:
         Shape (ticks,) each, ordered as ``CAUSES``; all arrays may have a last axis for a batch.
@@ -54,10 +54,10 @@ def ideal_walls(wall: Wall, x: Any, v: Any, way: Any, force: Any) -> Iterator[An
 
 
 def dissipated(wall: Wall, x: Any, v: Any, step_s: float) -> Any:
-    """Returns what a wall's law in continuous time takes in each plant step beside what it stores, J, shape (steps,).
+    """Returns what a wall's law in continuous time takes in each plant step besides what it stores, J, shape (steps,).
 
     It is the integral of (f(p, p') - V'(p)) p' while p > 0, along the cubic through positions and velocities at both
-    ends of a step, from or to where it comes through the surface.
+    ends of a step, from or to the point where the cubic crosses the surface.
 
     Args:
         x, v: true positions and velocities at all plant steps and at the end, m and m/s, shape (steps + 1,).
@@ -83,7 +83,7 @@ def dissipated(wall: Wall, x: Any, v: Any, step_s: float) -> Any:
 
 
 def _cubic(course: tuple[Any, Any, Any, Any], s: Any) -> tuple[Any, Any]:
-    """Hermite's cubic at a share s of the step, m, and its derivative by s, m."""
+    """Returns Hermite's cubic at a fraction s of the step, m, and its derivative with respect to s, m."""
     start, rise, rate, end_rate = course
     bend, twist = 3.0 * rise - 2.0 * rate - end_rate, rate + end_rate - 2.0 * rise
     return start + s * (rate + s * (bend + s * twist)), rate + s * (2.0 * bend + s * (3.0 * twist))

@@ -1,4 +1,4 @@
-"""A loop of machine code (numba) for the books of a chain whose first body sticks and slips; to the bits of NumPy."""
+"""A machine-code loop (numba) for the books of a chain whose first body sticks and slips; bit-identical to NumPy."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from haploop.protocol.machine_code import MachineCode
 
 _code = MachineCode(__file__, (step_loop,))
 _inlined = partial(_code.compiled, inlined=True)
-# Integrals of products that are summed side by side: no chain has more, of dampers, links and the actuator.
+# Integrals of products that are summed side by side: no chain has more dampers, links and actuator than these.
 _PRODUCTS = 6
 
 
@@ -42,7 +42,7 @@ def _products_of(forms, w, count, found):  # pragma: no cover
 
 @_inlined
 def _stored(masses, links, stiffness, rest, at, then, way):  # pragma: no cover
-    """Returns the changes of kinetic energy, and of that in the springs."""
+    """Returns the changes of the kinetic energy and of the energy in the springs."""
     n, states, v, dv, kinetic, beyond = len(masses), len(at) - len(masses), 0.0, 0.0, 0.0, at[0] - rest
     for body in range(n):
         v, dv = v + at[n + body], dv + (then[n + body] - at[n + body])
@@ -97,7 +97,7 @@ def _book(
                 over += lasts
                 for i in range(states):
                     acting[i] = at[i]
-                # The hand's spring pulls as far as it is from its rest; so no digits go to where the rest lies.
+                # The hand's spring acts by its distance from rest; thus no digits are spent on where the rest lies.
                 acting[0] = at[0] - spring[1] + at[states]
                 acting[states], acting[states + 1], acting[states + 2] = rows[columns + 2, step, m], friction, start
                 kind = which[2 * level + stuck]
@@ -133,19 +133,19 @@ def books_by_tick(device: list[np.ndarray], rows: np.ndarray, pieces: np.ndarray
                   constant_N: np.ndarray, books: int, ticks: int, has_lag: bool) -> np.ndarray:  # fmt: skip
     """Returns the energy that each tick adds to each book, J, shape (books, ticks, members).
 
-    The books are those of ``ChainBooks``, with the lag of the actuator, if it has one, after the heats of dampers, and
-    last that lag and what the actuator's limits keep: the force beyond them times the way of the device.
+    The books are those of ``ChainBooks``, with the lag of the actuator, if it has one, after the heats of dampers. The
+    last is that lag plus what the actuator's limits keep: the force beyond them times the displacement of the device.
 
     Args:
         device: masses in kg, stiffness of the links in N/m, (stiffness N/m, rest m) of the hand's spring, and what
             ``ChainForms.for_loops`` returns.
-        rows: at each step and at the end, of each member: the states, what rounding left of the lengths, friction,
-            whether body 0 is stuck, the force held, tau and the force beyond the limits of the actuator; shape
-            (states + lengths + 5, steps + 1, members).
-        pieces: of steps that were cut, by member and in order: the same up to stuck, then step, level and what setting
-            v to 0 threw away; shape (states + lengths + 5, pieces).
-        first: where the pieces of each member begin, and where the last end, shape (members + 1,).
-        constant_N: constant forces in tau, and last their sum, N; none of them, no sum.
+        rows: at each step and at the end, for each member: the states, the rounding remainders of the lengths,
+            friction, whether body 0 is stuck, the force held, tau and the force beyond the limits of the actuator;
+            shape (states + lengths + 5, steps + 1, members).
+        pieces: of steps that were cut, by member and in order: the same up to stuck, then step, level and the energy
+            lost by setting v to 0, J; shape (states + lengths + 5, pieces).
+        first: where the pieces of each member begin, and where the last ones end, shape (members + 1,).
+        constant_N: constant forces in tau, followed by their sum, N; empty without such forces.
     """
     found = np.empty((books, ticks, rows.shape[2]))
     _book(*device, rows, pieces, first, constant_N, has_lag, found)
@@ -153,7 +153,7 @@ def books_by_tick(device: list[np.ndarray], rows: np.ndarray, pieces: np.ndarray
 
 
 def rates_of(rates: list[np.ndarray]) -> np.ndarray:
-    """Returns the rates with body 0 free and held as the loop takes them, (2, what acts, states, filled up)."""
+    """Returns the rates with body 0 free and held as the loop takes them, shape (2, acting, states padded)."""
     table = np.stack(rates)
     return np.ascontiguousarray(np.pad(table, [(0, 0), (0, STATES - table.shape[1]), (0, 0)]).swapaxes(1, 2))
 

@@ -1,11 +1,11 @@
-"""Meaning of every book, where log, summary and their reference call it by its name."""
+"""Meaning of every book, by its name in the log, the summary and their reference."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-# Running sums in J from the start of the run; in capitals what a scene names: an element by its kind, with a number
-# from the second of a kind on, and the table of a constant force that another package brings.
+# Running sums in J from the start of the run. Capitals stand for what a scene names: an element by its kind, with a
+# number from the second of a kind on; and the table of a constant force that another package brings.
 BOOKS: Mapping[str, str] = {
     "hand_work": "work of the hand's voluntary force on the body that it acts on; positive: given to the mechanism",
     "unmodelled_work": "work of an unmodelled hand on the device, in place of `hand_work`: what closes the balance; "

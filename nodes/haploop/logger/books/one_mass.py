@@ -42,8 +42,8 @@ class Steps(NamedTuple):
     Attributes:
         x, v: position in m and velocity in m/s.
         force: held, N.
-        tau: of the hand's muscles, N.
-        rise: by which tau rises over the step, N; None where it rises over none.
+        tau: force of the hand's muscles, N.
+        rise: change of tau over the step, N; None where it is constant over every step.
         dx: displacement over the step, m.
     """
 
@@ -64,7 +64,7 @@ class Ticks(NamedTuple):
 
 
 def one_mass_params(scene: Scene, time: Timebase, members: int | None = None) -> OneMassParams:
-    """Returns the parameters of a resolved scene, or of a batch of so many in a stacked scene."""
+    """Returns the parameters of a resolved scene, or of a batch of ``members`` in a stacked scene."""
     m, step_s = Mechanics.from_scene(scene), time.step_s
 
     def forms(mass: float, damping: float, stiffness: float) -> tuple[np.ndarray, np.ndarray]:
@@ -94,11 +94,11 @@ def increments(
         heat of damper i   b_i integral v^2 dt = b_i w' S w,  w = (v, m a, tau' h)
         actuator           (f_commanded - f) dx, what saturation and steps of force keep from the device
         constant force F   F dx, which is no part of the work of tau, though tau includes F
-    all summed over the steps of an interval; and over a whole interval, in which x goes by X and v by V:
+    all summed over the steps of an interval; and over a whole interval, in which x changes by X and v by V:
         kinetic change     m V (v + V / 2)
         spring change      k X (x - x_rest + X / 2)
-    Nothing is taken from the balance, so that its residual is a proof. Forces times dx (and not times v) keep the
-    books of a device at rest under load at rest too.
+    No book is derived from the balance, so that its residual is a proof. With forces times dx (and not times v), the
+    books of a device at rest under load do not change either.
 
     Args:
         commanded: the force of the wall and of every element over each step, N; None without an actuator's limits.
@@ -152,14 +152,14 @@ def hand_work(lag: np.ndarray, tau: Any, rise: Any, dx: Any, rates: Sequence[Any
 
 
 def beyond_limits(commanded: Iterable[Any], force: Any) -> Any:
-    """Returns the force commanded in all beyond the force that the actuator holds, N."""
+    """Returns the total commanded force less the force that the actuator holds, N."""
     return sum_rows(commanded) - force
 
 
 def as_squares(form: np.ndarray) -> np.ndarray:
     """Returns (a, b, c, d, e, f) of w' Q w as a sum of squares a (w0 + b w1 + c w2)^2 + d (w1 + e w2)^2 + f w2^2.
 
-    Q is positive: no term is below 0, and where they are far apart none cancels another.
+    Q is positive: no term is below 0, and terms of very different size do not cancel each other.
     """
     a = form[0, 0]
     b, c = form[0, 1:] / a
@@ -169,7 +169,7 @@ def as_squares(form: np.ndarray) -> np.ndarray:
 
 
 def sum_squares(factors: np.ndarray, w: Sequence[Any]) -> Any:
-    """Returns the sum of ``as_squares`` at every step; an entry of w that is left out at its end is 0."""
+    """Returns the sum of ``as_squares`` at every step; a last entry of w that is left out counts as 0."""
     a, b, c, d, e, f = factors
     first, second = b * w[1], w[1]
     first += w[0]
@@ -187,10 +187,10 @@ def sum_squares(factors: np.ndarray, w: Sequence[Any]) -> Any:
 
 
 class OneMassBooks:
-    """The books of one mass by ``names``, in the order in which ``increments`` yields them; heats end in ``_heat``.
+    """The books of one mass; ``names`` are in the order in which ``increments`` yields them, heats end in ``_heat``.
 
     Attributes:
-        energies: in a batch, in the place of ``step_energies``.
+        energies: used in a batch in place of ``step_energies``.
     """
 
     energies: Energies | None = None

@@ -19,31 +19,32 @@ Columns = dict[str, np.ndarray]
 BatchColumns = dict[str, Any]
 # (forms of all products, shape (products, rates, rates); form of the lag integral, shape (rates,)) by kind.
 Made = dict[int, tuple[np.ndarray, np.ndarray]]
-# A part of a step is counted in 2^-62 of it: whole numbers, whose sums over many steps may overflow unharmed.
+# A part of a step is counted in 2^-62 of it: whole numbers, whose sums over many steps may overflow harmlessly.
 _FINEST = 62
-# So many segments of a kind are integrated by themselves; fewer together with others, each by coefficients of its own.
+# From this many segments on, a kind is integrated separately; with fewer, together with others, each segment by its
+# own coefficients.
 _MANY = 256
-# For so many plant steps in all.
+# Used from this many plant steps in all.
 LOOPS = WhereItPays("haploop.logger.books.loops", 200_000)
 
 
 @dataclass(frozen=True)
 class Segments:
-    """Stretches of motion in their order; every plant step is one of them or several.
+    """Stretches of motion in order; every plant step is one segment or several.
 
     Attributes:
         step: plant step of each, counted from the first, shape (segments,).
-        level: it lasts h / 2^level.
+        level: the segment lasts h / 2^level.
         is_stuck: whether body 0 is held in it.
-        elapsed: part of its plant step that is over when it begins.
+        elapsed: fraction of its plant step that has passed when it begins.
         states: all states of the chain when it begins, shape (states, segments).
-        lows: what rounding left of the lengths among the states, shape (lengths, segments), m.
+        lows: rounding remainders of the lengths among the states, shape (lengths, segments), m.
         displacements: change of every length, shape (lengths, segments), m.
         changes: change of every rate, up to where the next begins, shape (lengths, segments), m/s.
         friction: on body 0, N.
         stop_loss: kinetic energy friction took from body 0 in stopping it at the end, J.
 
-    All but ``step`` may have a last axis for a batch, whose steps are all whole; of length 1 where they are alike.
+    All but ``step`` may have a last axis for a batch, whose steps are all whole; of length 1 where members are alike.
     """
 
     step: np.ndarray
@@ -87,11 +88,11 @@ class Segments:
         )
 
     def kinds(self) -> np.ndarray:
-        """Returns level * 2 + is_stuck: segments of a kind last equally long, with body 0 free, or held."""
+        """Returns level * 2 + is_stuck: segments of a kind have the same duration, and body 0 either free or held."""
         return self.level * 2 + self.is_stuck
 
     def groups(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray | slice]]:
-        """Returns (kinds, which kind each one is, which segments): those of a kind that has many, and all others.
+        """Returns groups (kinds, kind of each segment, ``which``): one per kind with many segments, one for the rest.
 
         ``which`` selects from arrays of shape (segments,), or (segments, batch): all, or those where a mask is true.
         """
@@ -135,7 +136,7 @@ def _in_order(steps: int, step_of_piece: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _elapsed(step: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Returns the part of its step that is over when each segment begins: exact, the same wherever a block begins."""
+    """Returns the fraction of its step that has passed when each segment begins: exact, wherever a block begins."""
     lasts = np.uint64(1) << (_FINEST - level).astype(np.uint64)
     over = np.cumsum(lasts) - lasts
     first = np.searchsorted(step, step)
@@ -144,7 +145,7 @@ def _elapsed(step: np.ndarray, level: np.ndarray) -> np.ndarray:
 
 @of_device
 def _made_of(_chain: Chain, _step_s: float) -> Made:
-    """Returns the forms made so far of a chain: runs of one device in one process share them."""
+    """Returns the forms made so far for a chain; runs of one device in one process share them."""
     return {}
 
 
@@ -154,7 +155,7 @@ class ChainForms:
     Args:
         chain: of a resolved scene, or of a batch, whose numbers may be arrays of shape (members,).
         step_s: duration of a plant step, s.
-        of_batch: whether members have chains of their own: then without friction, whose forms need no wide float.
+        of_batch: whether each member has its own chain; these are without friction, and their forms need no wide float.
 
     Attributes:
         names: the integrals, in the order of the rows of ``integrals``: heat of every damper to ground and of every
@@ -197,12 +198,12 @@ class ChainForms:
         Returns:
             Shape (integrals, segments), or (integrals, segments, batch), ordered as ``names``.
         """
-        # The hand's spring pulls as far as it is from its rest; so written no digits go to where the rest lies.
+        # The hand's spring acts by its distance from rest; thus no digits are spent on where the rest lies.
         states = segments.states.copy()
         states[0] = states[0] - self._chain.spring[1] + segments.lows[0]
         acting = [of.astype(self._real, copy=False) for of in (*states, force, segments.friction, tau)]
         groups, result = segments.groups(), np.empty((len(self.names), *force.shape))
-        if any(not isinstance(which, slice) for *_, which in groups):  # a mask selects from whole arrays alone
+        if any(not isinstance(which, slice) for *_, which in groups):  # a mask selects only from arrays of full shape
             acting, rise = [np.broadcast_to(of, force.shape) for of in acting], np.broadcast_to(rise, force.shape)
         forms = self.forms([kind for kinds, *_ in groups for kind in kinds.tolist()])
         for kinds, of, which in groups:
@@ -217,7 +218,7 @@ class ChainForms:
         return result
 
     def forms(self, kinds: Iterable[int]) -> Made:
-        """Returns the forms made so far, and of these kinds of segments; those of all levels are made at once."""
+        """Returns the forms made so far, with those of these kinds of segments; all missing levels are made at once."""
         missing = {*kinds} - self._made.keys()
         for stuck in {kind % 2 for kind in missing}:
             of, flow = sorted(kind for kind in missing if kind % 2 == stuck), self._flows[stuck == 1]
@@ -228,7 +229,7 @@ class ChainForms:
         return self._made
 
     def for_loops(self, kinds: np.ndarray, loops: Any) -> list[np.ndarray] | None:
-        """Returns what the loops of machine code need of some kinds and whole steps; None where floats are too short.
+        """Returns what the machine-code loops need for some kinds and whole steps; None where floats are too short.
 
         These are the rates with body 0 free and held, the forms of products and of the lag integral by kind, and the
         place of each kind among them.

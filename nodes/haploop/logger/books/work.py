@@ -1,4 +1,4 @@
-"""Work of held forces over ticks and plant steps, and its sums: the same however a run is cut into blocks."""
+"""Work of held forces over ticks and plant steps, and its sums, the same however a run is cut into blocks."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-# Sums a flow over the plant steps of each interval, from a first step on before an end.
+# Sums a flow over the plant steps of each interval, from a first step up to before an end.
 SumSteps = Callable[..., Any]
 # The book of an unmodelled hand: what all others leave over, so that they have no residual.
 CLOSING = "unmodelled_work"
 
 
 class BatchSums(NamedTuple):
-    """The sums of the books of a batch that take longest; each does what the function of NumPy does.
+    """The slowest sums of the books of a batch; each does the same as its counterpart in NumPy.
 
     Attributes:
         displacement, add_ticks: as ``displacement`` and ``add_ticks_of_batch``.
@@ -27,7 +27,7 @@ class BatchSums(NamedTuple):
 
 
 class Displacement(NamedTuple):
-    """The way of the device, with the digits that the difference of two positions has lost, m.
+    """The displacement of the device, with the digits that the difference of two positions has lost, m.
 
     Attributes:
         by_step: over every plant step, shape (ticks, steps), or (ticks, steps, batch).
@@ -43,7 +43,7 @@ def displacement(x: Any, x_low: Any, steps_per_tick: int | None, sum_steps: SumS
 
     Args:
         x: positions at every step and at the end, shape (ticks * n + 1,), or (ticks * n + 1, batch), m.
-        x_low: what rounding left of them, m.
+        x_low: their rounding remainders, m.
         steps_per_tick: n; None where the steps are those of one interval and have no axis for ticks.
     """
     dx = way(x[:-1], x[1:], x_low[:-1], x_low[1:])
@@ -53,7 +53,7 @@ def displacement(x: Any, x_low: Any, steps_per_tick: int | None, sum_steps: SumS
 
 
 def way(start: Any, end: Any, start_low: Any, end_low: Any) -> Any:
-    """Returns the displacement between two positions, each with what rounding left of it, m."""
+    """Returns the displacement between two positions, each with its rounding remainder, m."""
     dx = end - start
     dx += end_low - start_low
     return dx
@@ -75,7 +75,7 @@ def sampled_work(x_m: Any, force: Any) -> Any:
 
 
 def in_effect(force: np.ndarray, command: np.ndarray, first: int) -> np.ndarray:
-    """Returns the force an account commanded where each of these commands is in effect, N; 0 before the first command.
+    """Returns the force an account commanded while each of these commands is in effect, N; 0 before the first command.
 
     Args:
         force: of the commands from ``first`` on.
@@ -90,7 +90,7 @@ def in_effect(force: np.ndarray, command: np.ndarray, first: int) -> np.ndarray:
 
 
 def sum_rows(rows: Iterable[Any]) -> Any:
-    """Returns the sum of at least one array, first to last, element by element; all of one shape."""
+    """Returns the sum of one or more arrays of one shape, element by element, added first to last."""
     first, *others = rows
     total = first.copy()
     for row in others:
@@ -109,8 +109,8 @@ def sum_steps(flow: np.ndarray, first: int = 0, end: int | None = None) -> np.nd
     """
     steps = flow[:, first:end]
     if steps.ndim == 3 and steps.shape[2] > 1:
-        # NumPy adds in order over every axis but the one that lies closest in memory, here that of the batch; and
-        # -0.0 changes no number added to it, not even -0.0.
+        # NumPy adds in order over every axis but the one whose entries lie closest in memory, here that of the batch;
+        # and -0.0 changes no number added to it, not even -0.0.
         return np.add.reduce(steps, axis=1, initial=-0.0)
     return sum_rows(steps[:, step] for step in range(steps.shape[1]))
 
@@ -118,8 +118,8 @@ def sum_steps(flow: np.ndarray, first: int = 0, end: int | None = None) -> np.nd
 class Sums(NamedTuple):
     """Running sums, each a float and the sum of the rounding errors of its additions.
 
-    The errors of the additions, each exact, are summed beside (Ogita, Rump and Oishi 2005, cascaded summation), so that
-    sum + error carries about twice the digits of a float.
+    The errors of the additions, each exact, are summed separately (Ogita, Rump and Oishi 2005, cascaded summation), so
+    that sum + error carries about twice the digits of a float.
 
     Attributes:
         sums, errors: shape (rows,), or (rows, batch).
@@ -136,19 +136,19 @@ def lost(before: Any, added: Any, after: Any) -> Any:
 
 
 def no_sums(rows: int = 0, members: int | None = None) -> Sums:
-    """Returns so many sums that stand at 0, for one run or for every member of a batch."""
+    """Returns ``rows`` sums of value 0, for one run or for every member of a batch."""
     shape = (rows,) if members is None else (rows, members)
     return Sums(np.zeros(shape), np.zeros(shape))
 
 
 def with_rows(state: Sums, rows: int) -> Sums:
-    """Returns the sums with ``rows`` of them in all; new ones stand at 0."""
+    """Returns the sums, extended to ``rows`` of them; new ones are 0."""
     missing = np.zeros((rows - len(state.sums), *state.sums.shape[1:]))
     return Sums(*(np.concatenate([part, missing]) for part in state))
 
 
 def add_columns(state: Sums, increments: np.ndarray) -> tuple[Sums, np.ndarray]:
-    """Adds column after column, shape (rows, columns), and keeps every total on the way.
+    """Adds column after column, shape (rows, columns), and keeps every intermediate total.
 
     Returns:
         The sums after the last column, and the totals before the first column and after each one, shape
@@ -162,7 +162,7 @@ def add_columns(state: Sums, increments: np.ndarray) -> tuple[Sums, np.ndarray]:
 
 
 def add_ticks_of_batch(state: Sums, increments: np.ndarray) -> Sums:
-    """Adds tick after tick, shape (ticks, rows, batch), for every member to the same bits as ``add_columns``."""
+    """Adds tick after tick, shape (ticks, rows, batch), for every member bit-identical to ``add_columns``."""
     sums, errors = state.sums, state.errors.copy()
     for increment in increments:
         after = sums + increment

@@ -5,4 +5,4 @@
 
 
 class LogError(Exception):
-    """The log cannot be written further, or is no log; the message says which file, why, and what to do."""
+    """The log cannot be written further, or is not a log; the message says which file, why, and what to do."""

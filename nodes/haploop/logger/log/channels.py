@@ -51,14 +51,14 @@ CONTROLLER: Mapping[str, Column] = {
     "in_contact": Column("", "1 where the measured position lies strictly inside the wall, else 0"),
     "dissipation.N": Column("N", "force of element N in the list; 0 out of contact unless it acts always"),
 }
-# What an element shows beside its force is declared in its class, with its unit.
+# What an element shows besides its force is declared in its class, with its unit.
 OWN = Column("", "what element N shows of its memory, in the unit that its class declares")
-# Each link of telemetry leads on to the body that the log names.
+# Each link in the telemetry leads to the body that the log names.
 _FAR_END = {"cable": "tip", "grip": "hand"}
 
 
 class Sink(Protocol):
-    """Sink of channels: ``haploop.logger.log.writer.Log``, or what takes the same without a file."""
+    """Sink of channels: ``haploop.logger.log.writer.Log``, or an object that takes the same without a file."""
 
     def channel(
         self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str
@@ -81,7 +81,7 @@ class Channels:
         return seconds * 1_000_000_000 + rest * 1_000_000_000 // self._time.control_rate
 
     def plant(self, first: int, ticks: int, columns: dict[str, np.ndarray]) -> None:
-        """Writes one message a tick, an array of its steps; ``columns`` are ``motion_columns`` of whole intervals."""
+        """Writes one message per tick, an array of its steps; ``columns`` are ``motion_columns`` of whole intervals."""
         if self._every_step and ticks:
             steps = self._time.steps_per_tick
             self._plant_messages(first, ticks, steps, {name: column[:-1] for name, column in columns.items()})
@@ -102,7 +102,7 @@ class Channels:
         self._log.write(channel, self._log_times_ns(first, ticks), values.reshape(ticks, samples, len(units)))
 
     def controller(self, block: Block, since: int) -> None:
-        """Writes one message a tick from ``since`` on: estimates, the force of wall and elements, their total."""
+        """Writes one message per tick from ``since`` on: estimates, forces of wall and elements, and their total."""
         first = max(since, block["from_tick"])
         columns = {name: as_float64(data)[first - block["from_tick"] :] for name, data in block["columns"].items()}
         kinds = ", ".join(f"dissipation.{i} is {e['kind']}" for i, e in enumerate(block["elements"])) or "no element"
@@ -113,7 +113,7 @@ class Channels:
         self._ticks("/controller", f"the controller at every tick; {kinds}", units, first, columns)
 
     def energy(self, first: int, columns: dict[str, np.ndarray]) -> None:
-        """Writes one message a tick: the books as they stand."""
+        """Writes one message per tick: the totals of the books so far."""
         self._ticks("/energy", "the energy books at every tick", dict.fromkeys(columns, "J"), first, columns)
 
     def _ticks(self, topic: str, title: str, units: dict[str, str], first: int, columns: dict[str, np.ndarray]) -> None:

@@ -1,6 +1,6 @@
 """One MCAP chunk: messages gathered channel by channel, then compressed, checked by a CRC and indexed.
 
-Message records and their index are composed by NumPy, a block at a time: that takes 2.5 us a message against 20.9 us
+Message records and their index are composed by NumPy, a block at a time: that takes 2.5 us per message against 20.9 us
 through the ``mcap`` library's writer, which makes a Python call for each.
 """
 
@@ -21,10 +21,10 @@ from haploop.logger.log.table import Floats, TableLayout
 
 Compression = Literal["", "lz4"]
 
-# Negative levels give up size for speed. On a log of random motions -3 takes three quarters of the time of level 0 and
-# gives 3 % more bytes, still half of what goes in; -5 gives 14 % more and wins hardly any time.
+# Negative levels trade size for speed. On a log of random motions -3 takes three quarters of the time of level 0 for
+# 3 % more bytes, still half of the input; -5 gives 14 % more and saves hardly any time.
 _LZ4_LEVEL = -3
-# What stands before the data of a message record; its length counts what comes after it.
+# What precedes the data of a message record: a prefix, whose length counts the bytes that follow it, and a head.
 _PREFIX = [("opcode", "u1"), ("length", "<u8")]
 _HEAD = [("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")]
 
@@ -55,7 +55,7 @@ class TableRows:
         self._views = self._layout.views(self._records["message"])
 
     def append(self, sequence: int, log_times_ns: NDArray[np.int64], values: Floats) -> None:
-        """Adds messages, the first of which is number ``sequence`` on its channel; shapes as of ``Log.write``."""
+        """Adds messages, the first of which is number ``sequence`` on its channel; shapes as in ``Log.write``."""
         start, end = self.count, self.count + len(log_times_ns)
         if end > len(self._records):
             self._reserve(max(end, 2 * len(self._records)))
@@ -84,7 +84,7 @@ class TableRows:
 
 
 class FreeRows:
-    """Messages of any length, one by one; attributes and methods as of ``TableRows``."""
+    """Messages of any length, one by one; attributes and methods as in ``TableRows``."""
 
     def __init__(self, channel: int) -> None:
         self.channel = channel
@@ -127,9 +127,9 @@ def chunk(
     """Returns a chunk and the message indexes that follow it, as bytes, and the chunk's index for the file's summary.
 
     Args:
-        rows: the messages, at least one channel's and at least one message each.
-        start: byte of the file at which the chunk is to stand.
-        described: schema and channel records that are to stand before the messages.
+        rows: the messages of at least one channel, at least one message each.
+        start: byte of the file at which the chunk is to begin.
+        described: schema and channel records to be put before the messages.
     """
     body = b"".join([described, *(some.body() for some in rows)])
     packed = body

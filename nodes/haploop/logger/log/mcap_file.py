@@ -1,6 +1,6 @@
 """An MCAP file that only grows, piece by whole piece, and ends with a summary that lets a reader seek in it.
 
-What it holds is never half a piece, even when the disk is full.
+It never holds an incomplete piece, even when the disk is full.
 """
 
 from __future__ import annotations
@@ -21,29 +21,29 @@ from haploop.logger.log import LogError
 from haploop.protocol.transport.machine import MACHINE, Machine
 
 MAGIC = b"\x89MCAP0\r\n"
-# What the header says of the program that wrote the file.
+# Name in the header of the program that wrote the file.
 LIBRARY = "haploop"
 _CRC_BYTES = 4
-# Entries of the summary that are held in memory.
+# Bytes of summary entries that are held in memory.
 _HELD_BYTES = 1 << 16
 
 
 class McapFile:
-    """A new file, over any file of that name.
+    """A new file, which overwrites any file of that name.
 
     Attributes:
         size: bytes of the pieces written.
-        schemas, channels, attachments, message_counts: what its summary will tell of it.
+        schemas, channels, attachments, message_counts: what its summary will list.
     """
 
     def __init__(self, path: str | Path, machine: Machine = MACHINE) -> None:
-        """Makes the file and begins it; raises LogError where the operating system refuses."""
+        """Creates the file and writes its beginning; raises LogError where the operating system refuses."""
         self.path = Path(path)
         self.size = 0
         self._crc = 0
         self.schemas: list[mcap.Schema] = []
         self.channels: list[mcap.Channel] = []
-        # Some 130 bytes a chunk, which would be all that grows with a log: many are held in a nameless file.
+        # About 130 bytes per chunk, which alone would grow with the log in memory: many are held in a nameless file.
         self._chunk_indexes = bytearray()
         self._more_indexes: IO[bytes] | None = None
         self._chunks = 0
@@ -52,7 +52,7 @@ class McapFile:
         self.message_counts: dict[int, int] = {}
         self._failure: LogError | None = None
         try:
-            # Unbuffered: pieces are large, and an error then belongs to the piece that met it.
+            # Unbuffered: pieces are large, and an error is then raised for the piece that met it.
             self._file = machine.create(self.path)
         except OSError as error:
             raise LogError(
@@ -83,7 +83,8 @@ class McapFile:
         """Hands a piece to the operating system.
 
         Raises:
-            LogError: it refuses, now or at an earlier piece; the file is cut back to the whole pieces before and stays.
+            LogError: it refuses this piece or refused an earlier one; the file is cut back to the whole pieces before
+                that one, and kept.
         """
         self._append([piece])
 
@@ -93,7 +94,7 @@ class McapFile:
             raise self._failure
         size, crc = self.size, self._crc
         try:
-            # An interrupt may have left part of a piece, or all of it, uncounted behind the last one: write over it.
+            # An interrupt may have left all or part of an uncounted piece behind the last one: overwrite it.
             self._file.seek(size)
             for part in parts:
                 rest = memoryview(part)
@@ -118,7 +119,7 @@ class McapFile:
 
     @property
     def writable(self) -> bool:
-        """Tells whether another piece may be appended: neither closed nor refused by the operating system."""
+        """Tells whether another piece may be appended: the file is not closed, and the system refused no piece."""
         return not self._file.closed
 
     def close(self) -> None:
@@ -127,7 +128,7 @@ class McapFile:
             self._more_indexes.close()
 
     def append_summary(self) -> None:
-        """Ends the file, from the DataEnd record on; raises LogError as ``append`` does."""
+        """Writes the end of the file, from the DataEnd record on; raises LogError as ``append`` does."""
         self._append(self._summary())
 
     def _summary(self) -> Iterator[bytes]:

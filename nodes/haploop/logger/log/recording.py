@@ -1,4 +1,4 @@
-"""Arrays by channel and column: a log that was read from its file, or kept in memory."""
+"""Arrays by channel and column, of a log that was read from its file, or kept in memory."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TIMESTAMP = "timestamp"
 class Table(dict[str, Floats]):
     """The columns of a topic: float64 arrays of shape (rows,) by name, rows in order of log time.
 
-    A topic whose columns changed during the run has all of them, NaN in the rows from before or after.
+    A topic whose columns changed during the run has all of them, with NaN in the rows from before or after.
 
     Attributes:
         units: unit by column name, "" for a pure number.
@@ -51,7 +51,7 @@ class Table(dict[str, Floats]):
     def frame(self) -> pandas.DataFrame:
         """Returns the columns as a data frame, with ``frame.attrs["units"]`` by name.
 
-        Its index is the column ``timestamp``, named ``time (s)``, as which pandas labels the axis of a plot.
+        Its index is the column ``timestamp``, renamed ``time (s)``, which is how pandas labels the axis of a plot.
 
         Raises:
             ImportError: pandas is missing.
@@ -66,7 +66,7 @@ class Table(dict[str, Floats]):
         return frame
 
 
-# Rows of a topic: of its columns, or the maps of a topic without columns (``/events``).
+# Rows of a topic: a table of its columns, or the maps of a topic without columns (``/events``).
 Rows = Table | list[Event]
 
 
@@ -74,8 +74,8 @@ class Recording(dict[str, Any]):
     """The content of a log, rows by topic.
 
     Attributes:
-        truncated: whether the file ends before its closing summary, as that of a killed run or of one still going.
-        cut: a sentence on where it ends, "" for a whole file.
+        truncated: whether the file ends before its closing summary, as for a run that was killed or is still going.
+        cut: a sentence on where it ends, "" for a complete file.
         attachments: content of each attached file by name.
     """
 
@@ -99,13 +99,13 @@ class Recording(dict[str, Any]):
 def join(
     pieces: Sequence[tuple[NDArray[np.uint64], Rows]], units: Mapping[str, str] | None = None
 ) -> tuple[NDArray[np.uint64], Rows]:
-    """Joins pieces of one topic, rows in the order of log time and, at the same time, of the pieces.
+    """Joins pieces of one topic, with rows in the order of log time and, at equal times, of the pieces.
 
-    The tables are used up on the way, so that hardly more than one column is held twice.
+    The tables are used up in the process, so that hardly more than one column is held twice.
 
     Args:
-        pieces: log times in ns, shape (rows,), and rows: all tables or all lists of maps. What is returned is one, too.
-        units: the columns there shall be, by unit; those of the pieces when None. A piece without one has NaN there.
+        pieces: log times in ns, shape (rows,), and rows: all tables or all lists of maps. The result is a piece, too.
+        units: unit by column of the columns wanted; those of the pieces if None. A piece without one has NaN there.
     """
     times = np.concatenate([times for times, _ in pieces] or [np.empty(0, np.uint64)])
     order = None if (times[1:] >= times[:-1]).all() else np.argsort(times, kind="stable")
@@ -129,7 +129,7 @@ def join(
 
 
 def merge_columns(known: Mapping[str, str], new: Mapping[str, str]) -> dict[str, str]:
-    """Returns the columns of both, by unit, each in its own order: a new one comes after the one it follows."""
+    """Returns the columns of both with their units, each in its own order: a new one comes after the one it follows."""
     names, at = list(known), 0
     for name in new:
         if name in known:
@@ -142,7 +142,7 @@ def merge_columns(known: Mapping[str, str], new: Mapping[str, str]) -> dict[str,
 
 
 class MemoryLog:
-    """Takes what ``haploop.logger.log.writer.Log`` takes, and gives what reading its file would, bit for bit."""
+    """Takes what ``haploop.logger.log.writer.Log`` takes, and returns what reading its file would, bit for bit."""
 
     def __init__(self) -> None:
         self._channels: list[tuple[str, dict[str, str]]] = []
@@ -153,7 +153,7 @@ class MemoryLog:
     def channel(
         self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str
     ) -> int:
-        """Registers a channel, whatever the samples in a message and its title; for one known already, its number."""
+        """Returns the number of a channel, registered if it is new; samples per message and title do not matter."""
         key = topic, dict(columns)
         if key not in self._channels:
             self._channels.append(key)

@@ -1,7 +1,7 @@
-"""The records of an MCAP file: the whole ones, one after the other, what stands inside a chunk, and its messages.
+"""The records of an MCAP file: the complete ones, one after the other, the content of a chunk, and its messages.
 
 The frame of the file is read by the ``mcap`` library's own records; messages of equal length that stand end to end in a
-chunk, as this project's logs have them, are gathered and decoded by NumPy all at once.
+chunk, as in this project's logs, are gathered and decoded by NumPy all at once.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class MessageRun:
 
 
 def records(stream: IO[bytes]) -> Iterator[tuple[int, bytes]]:
-    """Yields opcode and content of each whole record that is left in a file as it is now."""
+    """Yields opcode and content of each complete record that remains in a file at its present length."""
     end = os.fstat(stream.fileno()).st_size
     while len(prefix := stream.read(_PREFIX.size)) == _PREFIX.size:
         opcode, length = _PREFIX.unpack(prefix)
@@ -59,19 +59,19 @@ def records(stream: IO[bytes]) -> Iterator[tuple[int, bytes]]:
 
 
 def chunk_body(content: bytes) -> bytes:
-    """Returns the records in a chunk, unpacked and checked (ValueError, RuntimeError, McapError: it is damaged)."""
+    """Returns the records in a chunk, unpacked and checked (ValueError, RuntimeError, McapError if it is damaged)."""
     chunk = Chunk.read(ReadDataStream(BytesIO(content)))
     body, size = get_chunk_data_stream(chunk, validate_crc=True)
     return body.read(size)
 
 
 def frame(opcode: int, length: int) -> bytes:
-    """Returns what stands before the content of a record."""
+    """Returns the bytes before the content of a record."""
     return _PREFIX.pack(opcode, length)
 
 
 def demand_index(content: bytes) -> None:
-    """Raises ValueError where an index of messages is none: a chunk with a flipped bit before it may pass for one."""
+    """Raises ValueError if this is no index of messages: a chunk with a flipped bit before it may pass for one."""
     head = 6
     if len(content) != head + int.from_bytes(content[2:head], "little"):
         raise ValueError("an index of messages is longer or shorter than it says")
@@ -100,7 +100,7 @@ def parts(body: bytes) -> Iterator[MessageRun | tuple[int, bytes]]:
 
 
 def _run(body: bytes, start: int, end: int) -> tuple[MessageRun, int]:
-    """Returns the messages like the one in ``start:end`` that follow each other from it on, and where the last ends."""
+    """Returns the run of messages like the one in ``start:end`` that begins with it, and where its last message ends."""
     if end > len(body):
         raise ValueError("a message is longer than its chunk")
     size, head_end = end - start, start + _PREFIX.size + 2  # the head is opcode, length and channel
@@ -118,7 +118,7 @@ def _run(body: bytes, start: int, end: int) -> tuple[MessageRun, int]:
 
 @dataclass(frozen=True)
 class LogChannel:
-    """A channel of this topic whose messages are laid out so; without columns, they are any maps."""
+    """A channel of a topic, with the layout of its messages; without columns, they are any maps."""
 
     topic: str
     layout: TableLayout
@@ -137,7 +137,7 @@ class LogChannel:
                     raise TypeError
                 return log_times_ns, maps
             rows_each, columns = self.layout.samples or 1, self.layout.read(b"".join([run.payloads for run in runs]))
-            if columns is None:  # other programs may order or encode the same numbers otherwise
+            if columns is None:  # other programs may order or encode the same numbers differently
                 messages = [msgpack.unpackb(payload) for run in runs for payload in run]
                 maps = [message if isinstance(message, list) else [message] for message in messages]
                 rows = [[float(one.get(name, "nan")) for name in units] for of_message in maps for one in of_message]

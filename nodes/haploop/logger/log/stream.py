@@ -1,4 +1,4 @@
-"""A log read chunk by chunk: of any length in the memory of one chunk, whole, cut off or still being written."""
+"""A log of any length, read chunk by chunk in the memory of one: complete, cut off or still being written."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from haploop.protocol.files import demand_regular
 
 _DAMAGE = (ValueError, OverflowError, RuntimeError, MemoryError, struct.error, McapError)
 _CRC_BYTES = 4
-# Records that may stand in the data and say nothing of it; from a number on they are those of other programs.
+# Records that may stand in the data and say nothing about it; from ``_PRIVATE`` on they belong to other programs.
 _PASSED_OVER, _PRIVATE = (Opcode.METADATA, Opcode.FOOTER), 0x80
 
 
@@ -55,14 +55,14 @@ class Batch(NamedTuple):
 class LogStream:
     """The batches of a log, to be iterated over.
 
-    Batches come in the order of the file, which for this project's logs is the order of time on each topic. Once all
-    have come, iterating again goes on with what was written to the file since.
+    Batches come in the order of the file, which for this project's logs is the order of time on each topic. After the
+    last one, iterating again continues with what has been written to the file since.
 
     Attributes:
         units: by topic, unit by column, of every channel met so far, chosen or not; empty for a topic without columns.
         attachments: content of each attached file met so far, by name.
-        read_bytes: how much of the file has been gone through.
-        until: no byte from here on is gone through.
+        read_bytes: how much of the file has been processed.
+        until: no byte from here on is processed.
     """
 
     def __init__(
@@ -72,13 +72,13 @@ class LogStream:
         columns: Collection[str] | None = None,
         until: int | None = None,
     ) -> None:
-        """Looks at how the file begins.
+        """Checks the beginning of the file.
 
         Args:
             path: a run's directory, or an MCAP file of msgpack maps.
             topics: only these topics, the others are not even unpacked; all when None.
             columns: only these columns, of every topic that has them; a batch has those of them that its channels have,
-                which may be none. A topic without columns at all, like ``/events``, is not concerned.
+                which may be none. A topic without columns at all, like ``/events``, is not affected.
             until: end of what is read, in bytes; the end of the file when None.
 
         Raises:
@@ -95,7 +95,7 @@ class LogStream:
         self._open_end, self._flaw = "it has no closing summary", ""
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, LogChannel] = {}
-        # Messages gone through by channel; None in a log of another program, which need not number its messages.
+        # Messages counted by channel; None in a log of another program, which need not number its messages.
         self._counts: dict[int, int] | None = None
         self._crc, self._is_over = zlib.crc32(MAGIC), False
         try:
@@ -111,7 +111,7 @@ class LogStream:
 
     @property
     def cut(self) -> str:
-        """Sentence on where the file ends or what of it is damaged, "" for one read to the end it should have."""
+        """Sentence on where the file ends or what in it is damaged, "" for one read to its proper end."""
         if not self._open_end:
             return self._flaw
         where = f"it was read up to byte {self.read_bytes} ({self._open_end})"
@@ -121,7 +121,7 @@ class LogStream:
         return self._topics is None or topic in self._topics
 
     def chosen_units(self) -> dict[str, dict[str, str]]:
-        """Returns unit by column of the columns asked for, by topic; those met so far that have any, or none at all."""
+        """Returns unit by column of the columns asked for, by topic met so far, if it has any of them or no columns."""
         chosen = {
             topic: {name: unit for name, unit in units.items() if self._columns is None or name in self._columns}
             for topic, units in self.units.items()
@@ -130,7 +130,7 @@ class LogStream:
         return {topic: units for topic, units in chosen.items() if units or not self.units[topic]}
 
     def __iter__(self) -> Iterator[Batch]:
-        """Yields all batches that have not come yet; raises LogError for messages that belie their schema."""
+        """Yields all batches that have not come yet; raises LogError for messages that contradict their schema."""
         with self.path.open("rb") as file:
             file.seek(self.read_bytes)
             try:
@@ -149,7 +149,7 @@ class LogStream:
                 self._open_end = f"what follows is damaged: {damage or type(damage).__name__}"
 
     def _take(self, opcode: int, content: bytes) -> list[Batch]:
-        """Returns the batches in one record of the file; indexes and the summary are passed over."""
+        """Returns the batches in one record of the file; indexes and the summary are skipped."""
         if self._is_over:
             return []
         if opcode == Opcode.CHUNK:
@@ -203,7 +203,7 @@ class LogStream:
         ]
 
     def _count(self, run: MessageRun, topic: str) -> None:
-        """Follows the numbers of the messages; raises ValueError where some are missing."""
+        """Checks the sequence numbers of the messages; raises ValueError where some are missing."""
         assert self._counts is not None
         before = self._counts.get(run.channel, 0)
         if run.sequence != before & 0xFFFFFFFF:
@@ -211,9 +211,9 @@ class LogStream:
         self._counts[run.channel] = before + len(run.log_times_ns)
 
     def _register(self, opcode: int, content: bytes) -> None:
-        """Takes in a schema or a channel; one that stands in a chunk, under its checksum, replaces one that does not.
+        """Registers a schema or a channel; one inside a chunk, under its checksum, replaces one outside.
 
-        Raises LogError for channels that are none of a run's.
+        Raises LogError for channels that do not belong to a run's log.
         """
         stream = ReadDataStream(BytesIO(content))
         if opcode == Opcode.SCHEMA:
@@ -238,7 +238,7 @@ def read(path: str | Path, topics: Collection[str] | None = None, columns: Colle
     """Returns the log of a run: arrays by topic and column, ``read(run)["/plant"]["x"]``.
 
     Arguments and errors are those of ``LogStream``. A topic that has columns, but none of those asked for, is left
-    out. Of a log that was cut off there is everything up to the last whole chunk, and ``truncated`` is set.
+    out. If the log was cut off, the result holds everything up to the last whole chunk, and ``truncated`` is set.
     """
     log = LogStream(path, topics, columns)
     batches: dict[str, list[Batch]] = {}
@@ -254,7 +254,7 @@ def read(path: str | Path, topics: Collection[str] | None = None, columns: Colle
 def survey(path: str | Path) -> LogStream:
     """Returns a stream that has gone through a whole log without unpacking a message.
 
-    Its ``units`` are those of every channel there is, and its ``read_bytes`` is where the log ended.
+    Its ``units`` are those of every channel in the log, and its ``read_bytes`` is where the log ended.
     """
     log = LogStream(path, topics=())
     for _ in log:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-# A message of more samples is none of a run's log, whatever a schema says.
+# A message with more samples does not come from a run's log, whatever a schema says.
 _MOST_SAMPLES = 1 << 20
 
 
@@ -71,10 +71,10 @@ class TableLayout:
         return [maps[str(number)] for number in range(len(self.columns))]
 
     def read(self, payload: bytes) -> list[Floats] | None:
-        """Takes messages standing end to end apart: a native float64 array a column, flat over messages and samples.
+        """Splits messages stored end to end into a native float64 array per column, flat over messages and samples.
 
-        Returns None when the bytes are not of this layout through and through. That is told by putting the numbers back
-        into the template: the bytes must be those that were read.
+        Returns None unless all of the bytes are of this layout. This is checked by putting the numbers back into the
+        template: the bytes must be those that were read.
         """
         if len(payload) % self.dtype.itemsize:
             return None

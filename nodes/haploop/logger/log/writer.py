@@ -2,7 +2,7 @@
 
 The frame of the file is made of the ``mcap`` library's own records. What is written a thousand times a second, the
 message records inside a chunk and their index, is composed by NumPy (``haploop.logger.log.chunk``), since the
-library's writer takes a Python call, and some microseconds, for every message.
+library's writer needs a Python call, and some microseconds, for every message.
 """
 
 from __future__ import annotations
@@ -21,41 +21,41 @@ from haploop.logger.log.table import Floats, TableLayout, pack
 from haploop.protocol.changes import Event
 from haploop.protocol.transport.machine import MACHINE, Machine
 
-# Bytes of messages after which a chunk is closed: what a reader must at least unpack to reach one message.
+# Bytes of messages after which a chunk is closed: the least that a reader must unpack to reach one message.
 _CHUNK_BYTES = 1 << 20
 
 
 class Log:
-    """One MCAP file; whatever writes to it raises LogError where the operating system refuses.
+    """One MCAP file; methods that write to it raise LogError where the operating system refuses.
 
     Messages gather in a chunk, which reaches the operating system when it passes 1 MB or at ``flush``; from then
-    on the end of this process takes nothing of it away. Inside a chunk messages stand channel by channel; readers
-    bring them into the order of log time. Log time and publish time are the simulated time in ns.
+    on nothing of it is lost when this process ends. Inside a chunk messages stand channel by channel; readers
+    put them in the order of log time. Log time and publish time are the simulated time in ns.
     """
 
     def __init__(self, path: str | Path, *, compression: Compression = "lz4", machine: Machine = MACHINE) -> None:
-        """Begins the file, over any file of that name."""
+        """Begins the file, and overwrites any file of that name."""
         self._compression: Compression = compression
         self._tables: dict[int, TableLayout] = {}
         self._known: dict[Hashable, int] = {}
         self._rows: dict[int, TableRows | FreeRows] = {}
         self._file = McapFile(path, machine)
-        # Channels that stand in a chunk, too, not just outside of any.
+        # Number of channels that are described in a chunk, too, not only outside of any.
         self._described = 0
 
     def channel(
         self, topic: str, columns: Mapping[str, str], *, samples_per_message: int | None = None, title: str
     ) -> int:
-        """Registers a channel and returns its number; for what is registered already, the number it has.
+        """Registers a channel and returns its number; if it is registered already, the number it has.
 
         The same topic may be registered again with other columns: ``haploop.logger.read`` joins its channels.
 
         Args:
             topic: such as ``/plant``.
             columns: unit by column name ("" for a pure number); empty for free maps, see ``message``.
-            samples_per_message: None for messages that are one map; else a message is an array of so many maps, 1 at
+            samples_per_message: None for messages that are one map; else a message is an array of this many maps, 1 at
                 least (ValueError).
-            title: what the channel holds, for people; also the name of its schema.
+            title: what the channel holds, for human readers; also the name of its schema.
         """
         key = (topic, tuple(columns.items()), samples_per_message, title)
         if key in self._known:
@@ -125,20 +125,20 @@ class Log:
         held = [rows for rows in self._rows.values() if rows.count]
         if not held:
             return
-        # Outside of a chunk no checksum protects what says which numbers these are, so it is said once more inside.
+        # Outside of a chunk no checksum protects the descriptions of the numbers, so they are repeated inside.
         new = range(self._described, len(self._file.channels))
         described = bytes_of(*(one for at in new for one in (self._file.schemas[at], self._file.channels[at])))
         piece, index = chunk(held, self._file.size, self._compression, described)
         self._file.append_chunk(piece, index)
         self._described = new.stop
-        # A channel that was silent in this chunk (replaced at a swap, say) gives its memory back.
+        # A channel that was silent in this chunk (replaced at a swap, say) frees its memory.
         self._rows = {rows.channel: rows for rows in held}
         for rows in held:
             self._file.message_counts[rows.channel] += rows.count
             rows.clear()
 
     def close(self) -> None:
-        """Closes the chunk, adds the summary and closes the file; nothing is left to do after a LogError or a close."""
+        """Closes the chunk, adds the summary and closes the file; does no more after a LogError or an earlier close."""
         try:
             if self._file.writable:
                 self.flush()

@@ -8,7 +8,7 @@ import numpy as np
 
 
 def about_trend(samples: np.ndarray) -> np.ndarray:
-    """Returns samples at equal steps, shape (..., count), less the straight line of least squares through them.
+    """Returns samples at equal steps, shape (..., count), less their least-squares straight line.
 
     With steps t around 0 the line is mean(x) + t (t·x) / (t·t).
     """
@@ -20,6 +20,6 @@ def about_trend(samples: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _centred(count: int) -> tuple[np.ndarray, float]:
-    """Returns so many equal steps around 0, and the sum of their squares."""
+    """Returns ``count`` equal steps centred on 0, and the sum of their squares."""
     t = np.arange(count) - (count - 1) / 2.0
     return t, float(np.vecdot(t, t))

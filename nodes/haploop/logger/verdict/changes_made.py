@@ -12,7 +12,7 @@ class ChangesMade:
         self._made: list[Change] = []
 
     def note(self, tick: int, event: Event) -> None:
-        """Takes an event of the run, in the order of ticks; one that changes nothing is passed over."""
+        """Takes an event of the run, in the order of ticks; one that changes nothing is ignored."""
         if is_change(event):
             self._made.append(Change.from_dict(tick, event))
         elif (change := refused_change(event)) and "refused" in event:
@@ -21,5 +21,5 @@ class ChangesMade:
             self._made.append(change)
 
     def last_within(self, first: float, end: int) -> int | None:
-        """Returns the tick of the last change after tick ``first`` and before tick ``end``; None for none."""
+        """Returns the tick of the last change after tick ``first`` and before tick ``end``; None without one."""
         return max((made.tick for made in self._made if first < made.tick < end), default=None)

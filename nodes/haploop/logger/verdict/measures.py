@@ -12,14 +12,14 @@ from haploop.logger.verdict.ripple import peak_to_peak, ripple
 
 WINDOW_S = 0.5
 CROSSINGS = 4
-# Below this, swinging is no limit cycle whatever the encoder: a thousandth of what a wall of 1 N/mm gives way to 1 N.
+# Swinging by less is no limit cycle, whatever the encoder: a thousandth of how far a wall of 1 N/mm yields to 1 N.
 SMALLEST_SWING_M = 1e-6
 # A quantised position on the wall's face may lie inside by this much, relative to the face's position.
 ROUNDING = 1e-12
-# What is said of a window alone, which tells nothing of stability, by the verdicts of a pushed loop that look the same.
+# Words for a window alone, which says nothing about stability, by the verdicts of a pushed loop that look the same.
 NO_SWING, SWINGING = "no-swing-seen", "swinging"
 OF_WINDOW = {"steady": NO_SWING, "limit-cycle": SWINGING}
-# Why the window of a run bears no word, whatever is seen in it.
+# Why the window of a run gets no word, whatever is seen in it.
 UNTOLD = {
     "no tick": "The run ended before its first tick was done.",
     "short": f"Less than {WINDOW_S:g} s of the run was seen.",
@@ -42,16 +42,16 @@ class Figures(NamedTuple):
 
     Attributes:
         from_s: when the window begins: half a second before the end, or half-way through a run shorter than that.
-        oscillation_m: how far the true position moved in it, peak to peak.
+        oscillation_m: how far the true position moved in the window, peak to peak.
         growth_1_s: the r of e^(r t) by which the swings grow; negative: they decay; None where nothing swings.
-        frequency_Hz: half as often as the swings cross the middle of the motion a second, to 1 Hz; None where nothing
+        frequency_Hz: half the number of crossings of the middle of the motion per second, to 1 Hz; None where nothing
             swings.
-        outside_fraction: share of its ticks that are out of contact.
-        displayed_stiffness_N_m: mean of total force over penetration, ticks in contact (Choi et al. 2022, V.B.2), but
-            those whose penetration is a rounding error of the wall's position; None of none.
-        penetration_mean_m: mean penetration of the measured position, ticks in contact; None of none.
-        force_ripple_N: what the commanded force swings by above 30 Hz, peak to peak.
-        force_swing_N: what the commanded force swings by, peak to peak.
+        outside_fraction: share of the ticks of the window that are out of contact.
+        displayed_stiffness_N_m: mean of total force over penetration at the ticks in contact (Choi et al. 2022, V.B.2),
+            except those whose penetration is a rounding error of the wall's position; None without such ticks.
+        penetration_mean_m: mean penetration of the measured position at the ticks in contact; None without such ticks.
+        force_ripple_N: swing of the commanded force above 30 Hz, peak to peak.
+        force_swing_N: swing of the commanded force, peak to peak.
     """
 
     from_s: float
@@ -75,9 +75,9 @@ class WindowMeasures(NamedTuple):
 
 
 class MeasuredColumns(NamedTuple):
-    """Measures of the windows of some runs, a list each: of ``swings``, the width peak to peak, the ticks in contact.
+    """Measures of the windows of some runs, a list each: the two of ``swings``, width peak to peak, ticks in contact.
 
-    Displayed stiffness and penetration are means of ticks in contact, None of none; forces are those of the command.
+    Displayed stiffness and penetration are means over ticks in contact, None without any; forces are of the command.
     """
 
     crossings: list[int]
@@ -105,14 +105,14 @@ class Extremes(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """A word, of a window ``no-swing-seen``, ``swinging``, ``no-contact`` or ``undecided``, and the rule behind it."""
+    """A word, for a window ``no-swing-seen``, ``swinging``, ``no-contact`` or ``undecided``, and the rule behind it."""
 
     word: str
     rule: str
 
 
 class RunMeasures(NamedTuple):
-    """Measures of a run so far: of its window, of all of it, and what does not count as a swing."""
+    """Measures of a run so far: of its window, of all of it, and the limit up to which nothing counts as a swing."""
 
     window: WindowMeasures
     extremes: Extremes
@@ -126,8 +126,8 @@ class RunMeasures(NamedTuple):
         """Judges the run by its window.
 
         Args:
-            diverged: why the plant ended by itself, if it did.
-            untold: why the window bears no word, a sentence; "" where it does.
+            diverged: why the plant itself ended the run, if it did.
+            untold: a sentence on why the window gets no word; "" where it gets one.
         """
         if diverged:
             return Verdict("diverged", f"{diverged}.")
@@ -143,10 +143,10 @@ class RunMeasures(NamedTuple):
         return Verdict(SWINGING if window.crossings >= CROSSINGS and window.growth >= 0.5 else NO_SWING, rule)
 
     def untold(self, ticks: int, ended: str, changed_s: float | None) -> str:
-        """Returns why the window bears no word, "" where it does.
+        """Returns why the window gets no word, "" where it gets one.
 
         Args:
-            ticks: that ran.
+            ticks: number of ticks that ran.
             ended: how the run ended; "" while it goes on.
             changed_s: when the loop was changed within the window; None if it was not.
         """
@@ -159,7 +159,7 @@ class RunMeasures(NamedTuple):
         return UNTOLD["changed"].format(at_s=changed_s, from_s=self.window.figures.from_s)
 
     def of_two_loops(self) -> RunMeasures:
-        """Returns them for a window in which the loop was changed: it displayed more than one stiffness."""
+        """Returns the measures for a window in which the loop was changed: it displayed more than one stiffness."""
         figures = self.window.figures._replace(displayed_stiffness_N_m=None)
         return self._replace(window=self.window._replace(figures=figures))
 
@@ -183,13 +183,13 @@ def window_span(ran: int, keep: int, steps_per_tick: int) -> Span:
 def measure_window(
     x: np.ndarray, rows: dict[str, np.ndarray], span: Span, rate: int, control_rate: int, swing_m: np.ndarray
 ) -> list[WindowMeasures]:
-    """Returns the measures of the windows of some runs; each is worked out as if it were alone.
+    """Returns the measures of the windows of some runs; each is computed as if it were alone.
 
     Args:
         x: positions at the last plant steps at least, shape (runs, steps), m.
         rows: ``CONTROLLER_COLUMNS`` at the last ticks at least, shape (runs, ticks).
         rate, control_rate: plant steps and ticks a second.
-        swing_m: what does not count as a swing, shape (runs,).
+        swing_m: limit up to which nothing counts as a swing, shape (runs,), m.
     """
     x = x[:, -span.steps - 1 :]
     held = {name: column[:, column.shape[1] - span.ticks :] for name, column in rows.items()}
@@ -214,7 +214,7 @@ def window_measures(measured: MeasuredColumns, span: Span, rate: int) -> list[Wi
     start_s, seconds = span.first / rate, (span.steps + 1) / rate
     measures = []
     for crossings, growth, width_m, inside, stiffness_N_m, depth_m, *forces_N in zip(*measured, strict=True):
-        # What is `growth` times as wide in the second half of the window follows e^(r t).
+        # A swing that is `growth` times as wide in the second half of the window follows e^(r t).
         rate_1_s = 2.0 * math.log(growth) / seconds if crossings >= CROSSINGS and growth > 0.0 else None
         frequency_Hz = crossings / (2.0 * seconds) if crossings >= CROSSINGS else None
         outside = (span.ticks - inside) / span.ticks if span.ticks else 1.0
@@ -236,7 +236,7 @@ def swings(x: np.ndarray, swing_m: np.ndarray) -> tuple[list[int], list[float]]:
         swing_m: a crossing counts only from beyond +swing_m to beyond -swing_m or back; shape (runs,).
 
     Returns:
-        Of every run (crossings, peak to peak of the second half over that of the first; 0 for no width at all).
+        For every run, crossings, and peak to peak of the second half over that of the first (0 for no width at all).
     """
     runs, steps = x.shape
     if steps < 4:

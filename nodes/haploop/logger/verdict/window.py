@@ -29,11 +29,11 @@ def keep_steps(plant_rate: int) -> int:
 
 
 class WindowState(NamedTuple):
-    """All that a window remembers. A ring has row i in place i modulo its length.
+    """The complete state of a window. A ring has row i in place i modulo its length.
 
     Attributes:
         x: ring of positions at the steps, m, shape (ticks kept * n, members). The state at step s is row s - 1, so that
-            an interval, but for its start, lies in one piece.
+            an interval, except for its start, lies in one piece.
         rows: rings of ``CONTROLLER_COLUMNS`` at the ticks, shape (ticks kept, members) each.
         x_min_m, x_max_m, force_max_N: extremes of the whole run, shape (members,).
     """
@@ -91,7 +91,7 @@ class Window:
         )
 
     def measures(self, places: Iterable[int] = (0,)) -> Iterator[RunMeasures]:
-        """Yields the measures of the members at these places, each worked out as if it were alone."""
+        """Yields the measures of the members at these places, each computed as if it were alone."""
         wanted = np.fromiter(places, np.intp)
         n, rate, s = self._time.steps_per_tick, self._time.plant_rate, self.state
         span = window_span(s.steps, keep_steps(rate), n)
