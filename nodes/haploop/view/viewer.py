@@ -16,20 +16,20 @@ from haploop.view.receive.past_session import PastSession
 from haploop.view.receive.run_session import RunSession
 from haploop.view.receive.runs import CommandFailed, PastRun, Run, Runs
 
-# Updates a second: telemetry is received and shown so often.
+# Updates per second, at which telemetry is received and shown.
 UPDATE_HZ = 31.5
 # Intervals at which runs are looked for, and at which pages are updated while nothing comes.
 _LOOK_S, _IDLE_TURN_S = 0.2, 0.05
 # Number of times that a summary is looked for, which a failed run may still be writing.
 _LOOKS = 10
-# The log is written at least so often: after this time it holds what was received before.
+# The log is written at least this often: after this time it holds what was received before.
 _LOGGED_S = 0.6
 _NOT_BEGUN = 'Run {}, "{}", ended before its first tick; its terminal says why.'
-# Pages look at so many parts of a run at once, without making one twice.
+# Number of parts of a run that pages may look at at once without one being made twice.
 _MOST_MADE = 4
-# An answer to whoever opens a live run waits so long for it to let the viewer in.
+# How long the answer to opening a live run waits for the run to let the viewer in.
 _JOIN_S = 1.0
-# Runs to choose from are looked for so often.
+# Interval at which runs to choose from are looked for.
 _LIST_S = 2.0
 
 
@@ -37,14 +37,14 @@ class Viewer:
     """Follows one run after another.
 
     Args:
-        first: id of the run to follow first; the newest there is when None.
+        first: id of the run to follow first; the newest one if None.
         from_start: whether what was logged before joining is shown as well.
         stays: whether another run is followed only when it is chosen.
 
     Attributes:
         session: the run on show; None before the first.
         overlay: a recorded run that is drawn behind it; None without.
-        why: why there is none on show, a sentence, if there is one.
+        why: a sentence on why no run is on show, if there is one.
     """
 
     def __init__(self, runs: Runs, first: str | None, from_start: bool, stays: bool = False) -> None:
@@ -65,9 +65,9 @@ class Viewer:
         await self._updated.wait()
 
     def snapshot(self, viewport: Viewport, beside: bool) -> tuple[tuple[object, ...], bytes] | None:
-        """Returns what is shown in a viewport, made once for all pages that ask, and what tells it from others.
+        """Returns a key and the snapshot of what is shown in a viewport, made once for all pages that ask.
 
-        ``beside`` asks for what stands beside the charts over time, too; both with and without are told as the same.
+        ``beside`` asks for what stands beside the charts over time, too; the key is the same with and without it.
         """
         if (session := self.session) is None:
             return None
@@ -106,7 +106,7 @@ class Viewer:
                 await self._complete(session)
 
     def _go_back(self, gone: Run) -> None:
-        """Follows again what was left, still live, for a run that is gone."""
+        """Follows the previous run again, if that is still live, after the run it was left for has gone."""
         left = self._followed
         if left is None or left.outcome:
             self._stays = False  # there is nothing to stay with
@@ -116,10 +116,10 @@ class Viewer:
             self._opened = left.run, asyncio.get_running_loop().create_future()
 
     def listing(self) -> Message:
-        """Returns the live runs, the recorded ones, and which are on show, looked for now and then.
+        """Returns the live runs and the recorded ones, looked for now and then, and which are on show.
 
-        ``overlay_diverged`` tells of the one drawn behind whether its numbers left every bound, ``overlay_end_s`` when
-        it ended, ``stays`` whether the page keeps its run when that has ended.
+        ``overlay_diverged`` tells whether the numbers of the run drawn behind left every bound, ``overlay_end_s`` when
+        that run ended, ``stays`` whether the page keeps its run when that has ended.
         """
         if wall_clock.monotonic() - self._listed[0] > _LIST_S:
             live, self._past = self._runs.live(), self._runs.past()
@@ -148,7 +148,7 @@ class Viewer:
         """Puts a live or a recorded run on show, for all pages.
 
         Raises:
-            CommandFailed: there is none of that id, or it was gone before it could be joined.
+            CommandFailed: there is no run of that id, or it was gone before it could be joined.
         """
         if self._followed and self._listed_as(self._followed) == run_id:
             self.session = self._followed
@@ -182,9 +182,9 @@ class Viewer:
             raise CommandFailed(f"Run {run_id} cannot be read: {error}") from error
 
     async def _next_run(self) -> tuple[Run, asyncio.Future[bool]]:
-        """Waits for a run to follow; returns it, and who is to be told whether it could be joined.
+        """Waits for a run to follow; returns it, and the future that takes whether it could be joined.
 
-        It is the one that was opened or asked for first, or the newest of those that were not there at the last choice.
+        It is the run that was opened or asked for first, or the newest of those that were not there at the last choice.
         """
         while True:
             live = self._runs.live()
@@ -203,7 +203,7 @@ class Viewer:
         return [run for run in fresh if self._first and run.id.startswith(self._first)] if self._stays else fresh
 
     async def _idle(self, seconds: float) -> None:
-        """Updates pages while no telemetry comes: one may have changed its viewport."""
+        """Updates pages while no telemetry comes: a page may have changed its viewport."""
         until = wall_clock.monotonic() + seconds
         while wall_clock.monotonic() < until:
             self._notify_pages()
@@ -236,7 +236,7 @@ class Viewer:
         self._notify_pages()
 
     async def _complete(self, session: RunSession) -> None:
-        """Reads what is there only when a run is over: from its log whatever was not received, and its summary.
+        """Reads what is available only after the end of a run: what was not received, from its log, and its summary.
 
         The verdict comes last, when the launcher has judged the run; a new run is not kept waiting for it.
         """
@@ -265,15 +265,15 @@ class Viewer:
                 await asyncio.to_thread(backfill.read)
             except (OSError, LogError):
                 if over:
-                    return  # none that this process may read: what is received is all there is
-                continue  # the logger, welcomed at the same time, may be about to make it
+                    return  # no log that this process may read: there is only what was received
+                continue  # the logger, welcomed at the same time, may be about to create it
             if over or backfill.reaches(session.history):
                 session.prepend(backfill.history)
                 return
 
 
 async def _end(tasks: Sequence[asyncio.Task[None]]) -> None:
-    """Cancels tasks that work beside the one that draws; what one of them raised is reported, and nothing else ends."""
+    """Cancels tasks that run beside the one that draws; an error in one of them is reported, and ends nothing else."""
     for task in tasks:
         task.cancel()
     for error in await asyncio.gather(*tasks, return_exceptions=True):

@@ -100,7 +100,7 @@ def parts(body: bytes) -> Iterator[MessageRun | tuple[int, bytes]]:
 
 
 def _run(body: bytes, start: int, end: int) -> tuple[MessageRun, int]:
-    """Returns the run of messages like the one in ``start:end`` that begins with it, and where its last message ends."""
+    """Returns the run of messages that begins with the one in ``start:end``, all like it, and where the run ends."""
     if end > len(body):
         raise ValueError("a message is longer than its chunk")
     size, head_end = end - start, start + _PREFIX.size + 2  # the head is opcode, length and channel

@@ -15,7 +15,7 @@ from haploop.protocol.changes import KINDS, Event, describe, happened_at
 from haploop.protocol.transport.wire import Message
 from haploop.view.receive.run_session import RunSession
 
-# A page lists no more events than these, the newest.
+# A page lists at most this many events, the newest.
 _MOST_EVENTS = 1000
 WAITING = {"type": "state", "phase": "waiting", "why": "", "run": None, "options": None, "summary": None, "nodes": []}
 # What the page says where a run has ended without a verdict.
@@ -35,7 +35,7 @@ _JUDGED = (
 )
 
 
-# Kept: json.dumps makes one for every header.
+# Kept, since json.dumps makes a new one for every header.
 _COMPACT = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 
 
@@ -54,7 +54,7 @@ class Table:
     Attributes:
         t0_s, dt_s: row i is at ``t0_s + i dt_s``, s.
         values: shape (columns, rows).
-        envelope: whether each two rows are the extremes of one interval of time, instead of samples.
+        envelope: whether each pair of rows holds the extremes of one interval of time, instead of samples.
         last: the newest values of the columns, all of one tick; empty where they are not known.
         more: further numbers of the header.
     """
@@ -71,7 +71,7 @@ class Table:
 
 @lru_cache(maxsize=64)
 def _named(columns: tuple[Column, ...]) -> str:
-    """Returns the entries of columns as JSON, written once: they are most of a header, and seldom others."""
+    """Returns the entries of columns as JSON, encoded once: they are most of a header, and seldom change."""
     return _COMPACT.encode([column._asdict() for column in columns])
 
 
@@ -101,7 +101,7 @@ def encode(from_s: float, to_s: float, tables: Sequence[Table], **more: Any) -> 
     head = f'{{"tables":[{entries}],{_COMPACT.encode(numbers)[1:]}'.encode()
     head += b" " * (-(4 + len(head)) % 8)
     parts = [len(head).to_bytes(4, "little"), head]
-    with np.errstate(over="ignore", invalid="ignore"):  # beyond what a float32 holds is infinite on the screen too
+    with np.errstate(over="ignore", invalid="ignore"):  # beyond a float32: infinite, as on the screen
         for table in tables:
             data = table.values.astype("<f4").tobytes()
             parts += [data, bytes(-len(data) % 8)]
@@ -151,7 +151,7 @@ def state(session: RunSession) -> Message:
     judged = (summary, summary["window"], summary["energy"]) if summary else (session.status,) * 3
     for entry, names in zip(judged, _JUDGED, strict=True):
         message |= {name: entry.get(name) for name in names}
-    # Options are much the largest part, and fit for JSON since they came.
+    # Options are by far the largest part, and have been fit for JSON since they came.
     return {**finite(message), "options": None if session.outcome else session.clock.options}
 
 

@@ -1,4 +1,4 @@
-"""Tables over time: position, force, energy and own columns of elements, fit for a number of points side by side."""
+"""Tables over time, made for a number of points side by side: position, force, energy and own columns of elements."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from haploop.view.look.book_names import book_names, kind_of
 from haploop.view.store.history import TRUE, WALL_BOOK, History
 from haploop.view.store.lod_series import LodSeries
 
-# Rows per point of the page at most; beyond, the rows are summed up in so many buckets per point.
+# Most rows per point of the page; if there are more, they are summarised in so many buckets per point.
 _ROWS_A_POINT, _BUCKETS_A_POINT = 2.0, 1.0
-# Parts of an overview of the run; units of own columns that are shown, the first.
+# Number of parts of an overview of the run; number of units of own columns that are shown, the first ones.
 _OVERVIEW_PARTS, _MOST_UNITS = 256, 3
 _BODIES = {"x": "position", "tip_x": "tip", "hand_x": "hand"}
 _MEASURED = {"wall_position": Column("wall", "m", "wall"), "x_measured": Column("x_measured", "m", "measured")}
@@ -23,7 +23,7 @@ _MEASURED = {"wall_position": Column("wall", "m", "wall"), "x_measured": Column(
 Part = tuple[LodSeries, Mapping[str, Column]]
 # Which columns are worth showing, as truth values, from their values in the interval, shape (columns, rows).
 AreShown = Callable[[Sequence[Column], np.ndarray], np.ndarray]
-# A table over time before its rows: its name, its parts, and which of its columns are shown.
+# The plan of a table over time: its name, its parts, and which of its columns are shown.
 Planned = tuple[str, list[Part], AreShown | None]
 
 
@@ -32,13 +32,13 @@ def are_there(_: Sequence[Column], values: np.ndarray) -> np.ndarray:
 
 
 class Interval:
-    """Makes tables over time of the ticks from ``first`` to before ``end``, fit for a number of points."""
+    """Makes tables over time of the ticks from ``first`` to before ``end``, for a number of points side by side."""
 
     def __init__(self, first: int, end: int, rate: int, points: int) -> None:
         self._first, self._end, self._rate, self._points = first, end, rate, points
 
     def table(self, name: str, parts: list[Part], are_shown: AreShown | None = None) -> Table | None:
-        """Returns a table of columns of some series, the first of which has the most rows a tick; None for none."""
+        """Returns a table of columns of some series, the first with the most rows per tick; None without columns."""
         if not parts[0][1]:
             return None
         all_series, most = [series for series, _ in parts], parts[0][0].rows_per_tick
@@ -65,13 +65,13 @@ class Interval:
         return Table(name, first / self._rate, step / self._rate, columns, rows, not in_full, last.tolist())
 
     def _last(self, wanted: Sequence[tuple[LodSeries, Sequence[str]]]) -> np.ndarray:
-        """Returns columns at the beginning of the newest tick that all series know; NaN where it is not in full."""
+        """Returns columns at the start of the newest tick that all series know; NaN where it is not held in full."""
         tick = min([self._end, *(series.end_tick for series, _ in wanted)]) - 1
         found = [series.rows(names, tick, tick + 1)[:, 0] for series, names in wanted]
         return np.concatenate(found) if len(found) > 1 else found[0]
 
     def _bucket(self, all_series: list[LodSeries]) -> int:
-        """Returns the ticks of a bucket: the least power of two that leaves no more buckets than there is room for."""
+        """Returns the ticks of a bucket: the least power of two that gives no more buckets than there is room for."""
         room = _BUCKETS_A_POINT * self._points
         bucket = 1 << max(0, math.ceil(math.log2((self._end - self._first) / room)))
         for series in all_series * 2:  # what is coarse enough for one may begin too early for another
@@ -123,9 +123,9 @@ def _energy(history: History) -> Planned:
 
 
 def _books_at_work(history: History, books: list[str]) -> dict[str, str]:
-    """Returns the newest books of each kind, as many as elements of the kind are at work, with these by place and kind.
+    """Returns the newest books of each kind, as many as elements of the kind are at work, with place and kind of these.
 
-    The others are closed.
+    The other books are closed.
     """
     elements = list(enumerate(history.at_work.elements))
     found: dict[str, str] = {}
@@ -137,7 +137,7 @@ def _books_at_work(history: History, books: list[str]) -> dict[str, str]:
 
 
 def own_columns(history: History) -> list[Part]:
-    """Returns what elements show beside their forces, a part for each of the first units."""
+    """Returns what elements show besides their forces, a part for each of the first units."""
     units = dict.fromkeys(unit for unit, _ in history.own.values())
     return [
         (history.ticks, {name: Column(name, unit, label) for name, (its, label) in history.own.items() if its == unit})

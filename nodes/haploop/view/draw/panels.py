@@ -19,13 +19,13 @@ from haploop.view.look.spectrum import amplitudes, main_line
 from haploop.view.store.history import History
 from haploop.view.store.lod_series import LodSeries
 
-# Phase plots show so many periods of a swing, which is looked for in so much time, or all of that time; rows at most.
+# Phase plots show this many periods of a swing, which is looked for in this time, or all of that time; most rows.
 _PERIODS, _PHASE_S, _MOST_ROWS = 2.0, 0.4, 8000
-# And so many turns of the position at most.
+# They show at most this many turns of the position.
 _MOST_TURNS = 24
-# Ticks of which a spectrum is made at most, the newest; simulated time of the samples that are heard at once.
+# Most ticks, the newest, of which a spectrum is made; simulated time of the samples that are heard at once.
 _SPECTRUM_TICKS, _SOUND_S = 2048, 0.25
-# Points of the curve of a wall that is no spring.
+# Points of the curve of a wall that is not a spring.
 _CURVE = 60
 _BOTH = [Column("x", "m", "position"), Column("force", "N", "force")]
 
@@ -45,7 +45,7 @@ Sent = tuple[list[Table | None], dict[str, Any]]
 
 
 def _loops(look: Look) -> Sent:
-    """Returns the two phase plots of Choi et al. 2022, of two periods where a swing has a line, else of 0.4 s."""
+    """Returns the two phase plots of Choi et al. 2022, of two periods if a swing has a spectral line, else of 0.4 s."""
     newest = _newest_periods(look.history, look.first, look.end)
     return [made(look.history, newest, look.end) for made in (_force_position, _momentum)], {}
 
@@ -64,22 +64,22 @@ def _compare(look: Look) -> Sent:
 
 
 def _own(look: Look) -> Sent:
-    """Returns what elements show beside their forces, a table for each unit."""
+    """Returns what elements show besides their forces, a table for each unit."""
     parts = own_columns(look.history)
     return [look.interval.table(f"own.{place}", [part], are_there) for place, part in enumerate(parts)], {}
 
 
 def _last(history: History, series: LodSeries, first: int, end: int) -> tuple[int, int]:
-    """Returns the ticks of a phase plot, the last that a series holds in full, (first, end); (0, 0) for none."""
+    """Returns the ticks (first, end) of a phase plot, the last that a series holds in full; (0, 0) without any."""
     end = min(end, series.end_tick, end if history.stop_tick is None else history.stop_tick)
     first = max(first, series.full_from_tick, end - round(_PHASE_S * history.time.control_rate))
     return (first, end) if first < end else (0, 0)
 
 
 def _newest_periods(history: History, first: int, end: int) -> int:
-    """Returns the tick from which on two periods of the main swing of the last 0.4 s lie, ``first`` without one.
+    """Returns the tick at which the last two periods of the main swing of the last 0.4 s begin; ``first`` without one.
 
-    There are ``_MOST_TURNS`` turns at most: a buzz under a slow motion would make a ball of wool.
+    There are ``_MOST_TURNS`` turns at most: a buzz on top of a slow motion would make a tangle of lines.
     """
     found, end = _last(history, history.steps, first, end)
     if found == end:
@@ -95,10 +95,10 @@ def _newest_periods(history: History, first: int, end: int) -> int:
 def _force_position(history: History, first: int, end: int) -> Table | None:
     """Returns penetration (m, positive inside) and force out of the wall (N) at every plant step (Fig. 3).
 
-    The force is the one applied, total of wall and elements, held while the position moves on. Where it runs
-    counter-clockwise, the area within is energy given to the device. ``stiffness`` (N/m) is that of the ideal spring;
-    of a wall that is none, ``curve`` has depths (m) and the forces (N) that it stores there; None of both where its law
-    is not known.
+    The force is the one applied, total of wall and elements, held while the position moves on. Where the plot runs
+    counter-clockwise, the enclosed area is energy given to the device. ``stiffness`` (N/m) is that of the ideal spring;
+    for a wall that is not a spring, ``curve`` has depths (m) and the forces (N) that it stores there. There is neither
+    if the law of the wall is not known.
     """
     first, end = _last(history, history.steps, first, end)
     inward = history.at_work.into_wall
@@ -117,7 +117,7 @@ def _force_position(history: History, first: int, end: int) -> Table | None:
         if not isinstance(wall := make_wall(history.at_work.wall), Spring):
             curve = np.linspace(0.0, max(float(depth.max()), 0.0), _CURVE)
             more["curve"] = [curve.tolist(), wall.held(curve).tolist()]
-    except KeyError:  # the wall of a file, or of a package that is not installed: no spring, and not known here
+    except KeyError:  # a wall from a file, or from a package that is not installed: not a spring, and not known here
         more["stiffness"] = None
     return Table("loop", first / time.control_rate, each / time.plant_rate, columns, values, more=more)
 

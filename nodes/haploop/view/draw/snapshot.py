@@ -21,8 +21,8 @@ class Viewport:
         span_s: length of the interval in simulated time, s; None for the whole run.
         points: about how many points fit side by side.
         end_s: end of the interval, s; None for the newest tick.
-        panel: what is shown beside the charts over time, of ``PANELS``.
-        sound: whether the newest samples of the force are wanted, to be heard.
+        panel: what is shown beside the charts over time, one of ``PANELS``.
+        sound: whether the newest samples of the force are wanted, to play them.
     """
 
     span_s: float | None = 2.0
@@ -42,11 +42,11 @@ def snapshot(
     """Returns everything a page shows as bytes, packed by :func:`haploop.view.draw.messages.encode`.
 
     Tables over time are position, force and energy; each row by row where the page has room for it, else as an envelope
-    whose rows are the two extremes of consecutive buckets, rising or falling as they do. Position and total force of
-    ``overlay``, another run, come with them. Where ``beside`` is asked for, there is an overview of the whole run, too,
-    and what the page's panel asks for, to which ``changes`` belong. A table without data is left out. ``coarse``
-    in the header tells that the interval begins before what is held in full. Of a run that has ended the interval does
-    not reach beyond its end, but for what ``overlay`` has there.
+    whose rows are the two extremes of consecutive buckets, rising or falling as the data do. Position and total force
+    of ``overlay``, another run, come with them. With ``beside`` there is also an overview of the whole run, and what
+    the page's panel asks for, which includes ``changes``. A table without data is left out. ``coarse`` in the header
+    tells whether the interval begins before what is held in full. The interval of a run that has ended does not reach
+    beyond its end, except for what ``overlay`` has there.
     """
     rate = history.time.control_rate
     from_tick, to_tick = _window(history, viewport)

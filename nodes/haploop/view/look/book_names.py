@@ -15,14 +15,14 @@ _NUMBER = re.compile(r"-\d+$")
 
 @lru_cache(maxsize=256)
 def kind_of(book: str) -> str:
-    """Returns the kind of the element that ``damping-2`` is the book of."""
+    """Returns the kind of the element to which a book such as ``damping-2`` belongs."""
     return _NUMBER.sub("", book)
 
 
 def book_names(history: History) -> Mapping[str, str]:
-    """Returns by book, without ``.true``, what it is called: ``damping``, or ``damping, from 1.2 s``; no two alike.
+    """Returns the shown names by book, without ``.true``: ``damping``, or ``damping, from 1.2 s``; no two are alike.
 
-    Every change of a parameter opens a book. One that was open when the page joined is of ``earlier``.
+    Every change of a parameter opens a book. One that was open when the page joined is named ``earlier``.
     """
     wanted = tuple(name for name in history.energy.names if name.endswith(TRUE))
     return _named(wanted, tuple(map(history.opened.get, wanted)), history.time.control_rate)
@@ -30,7 +30,7 @@ def book_names(history: History) -> Mapping[str, str]:
 
 @lru_cache(maxsize=64)
 def _named(columns: tuple[str, ...], opened: tuple[int | None, ...], rate: int) -> Mapping[str, str]:
-    """Names the books in these columns, opened at these ticks; once, where picture after picture has the same."""
+    """Names the books in these columns, opened at these ticks; once, as long as successive pictures have the same."""
     books = {
         name.removesuffix(TRUE): tick
         for name, tick in zip(columns, opened, strict=True)

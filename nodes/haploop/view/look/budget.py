@@ -11,7 +11,7 @@ from haploop.logger.books.ideal_wall import DISSIPATED
 from haploop.view.look.book_names import book_names
 from haploop.view.store.history import EARLIER, TRUE, WALL_BOOK, History
 
-# Books of the plant in the order in which they are told; all but these are named after themselves.
+# Books of the plant in the order in which they are reported; labels of books that do not go by their own name.
 _STORED = ("kinetic", "spring", "actuator")
 _LABELS = {"unmodelled_work": "hand, by what is left over", EARLIER.removesuffix(TRUE): "earlier elements"}
 # The wall's share by cause: label, the book it goes up to and the book it starts from; "" is nothing.
@@ -23,12 +23,12 @@ _OF_WALL = (
 
 
 def budget(history: History, from_tick: int, end: int) -> dict[str, Any] | None:
-    """Returns every cause with its joules, below 0 where it feeds the device and above where it takes energy out.
+    """Returns every cause with its energy in J, negative where it feeds the device, positive where it takes energy out.
 
     ``rows`` are {name, total_J, window_J}: since the start of the run, and in the ticks from ``from_tick`` to before
-    ``end``. They sum to nothing but rounding, as the books close: what is put into store counts as taken out.
-    ``from_s`` is where the window begins, later than asked where no energy is known before; it lies within ``about_s``
-    where the past is held coarsely. None without any energy.
+    ``end``. They sum to 0 but for rounding, since the books close: what is put into store counts as taken out.
+    ``from_s`` is where the window begins, later than requested where no energy is known before; it is exact to within
+    ``about_s`` where the past is held coarsely. Returns None without any energy.
     """
     series, rate = history.energy, history.time.control_rate
     end = min(end, series.end_tick)
@@ -48,7 +48,7 @@ def budget(history: History, from_tick: int, end: int) -> dict[str, Any] | None:
 
 
 def _at(series: Any, names: Sequence[str], tick: int) -> tuple[np.ndarray, int]:
-    """Returns the books at a tick, and within how many ticks of it they are; a book not yet open stands at 0."""
+    """Returns the books at a tick, and to within how many ticks that is exact; a book not yet open is 0."""
     if tick >= series.full_from_tick:
         return np.nan_to_num(series.rows(names, tick, tick + 1)[:, 0], nan=0.0), 0
     bucket = series.bucket_from(tick, 1)
@@ -57,14 +57,14 @@ def _at(series: Any, names: Sequence[str], tick: int) -> tuple[np.ndarray, int]:
 
 
 def _causes(names: Sequence[str], labels: Mapping[str, str]) -> Iterator[tuple[str, list[tuple[float, str]]]]:
-    """Yields each cause with the books that make it, and their signs; ``labels`` by book, of those not told by name."""
+    """Yields each cause with the books that make it up, and their signs; ``labels`` rename books, by book."""
     for name in names:
         if name.endswith("_work"):
             yield labels.get(name, name.removesuffix("_work")), [(-1.0, name)]
     has_wall = "ideal" in names
     by_law = [(-1.0, DISSIPATED)] if DISSIPATED in names else []
     for label, up_to, start in _OF_WALL if has_wall else ():
-        estimates = " and estimates" if by_law and label == "quantisation" else ""  # a damper goes by the estimated v
+        estimates = " and estimates" if by_law and label == "quantisation" else ""  # a damper acts by the estimated v
         yield label + estimates, [(1.0, up_to), (-1.0, start), *(by_law if start == "ideal" else [])]
     if by_law:
         yield "law of the wall", [(1.0, DISSIPATED)]

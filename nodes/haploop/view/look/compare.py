@@ -13,7 +13,7 @@ from haploop.view.look.budget import budget
 from haploop.view.look.sight import Sight, see, window_ticks
 from haploop.view.store.history import History
 
-# Changes of which the half second before is kept, the newest.
+# Number of changes, the newest, of which the half second before is kept.
 _MOST = 64
 
 
@@ -39,7 +39,7 @@ class Changes:
         return max((tick for tick in self._ticks if tick < end), default=0)
 
     def note(self, history: History, events: Iterable[tuple[int, Event]]) -> None:
-        """Notes the changes among these events, and keeps what was before those that the history has reached."""
+        """Records the changes among these events, and keeps what was before those that the history has reached."""
         self._ticks = sorted({tick for tick, event in events if "swap" in event or "set" in event})
         for tick in self._ticks[-_MOST:]:
             if tick and tick not in self._before and history.end_tick >= tick:
@@ -64,9 +64,9 @@ class Changes:
         return see(history, self.since(end), end, self._resolution_m)
 
     def pair(self, history: History) -> tuple[int, Half | None, Half | None] | None:
-        """Returns the tick of the last change, and its two sides, each None where it is not held; None for no change.
+        """Returns the tick of the last change, and its two sides, each None if it is not held; None without a change.
 
-        The side after is the newest half second, of less where less has passed.
+        The side after it is the newest half second, or less if less has passed.
         """
         end = last_tick(history)
         if not (tick := self.since(end)):

@@ -1,4 +1,4 @@
-"""Sight of a loop: what its newest half second and two seconds show, in a word told only of a window in one regime."""
+"""Sight of a loop: what its newest half second and two seconds show, and a word, given only for one regime."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from haploop.logger.verdict.measures import CROSSINGS, ROUNDING, SMALLEST_SWING_
 from haploop.view.look.spectrum import main_line
 from haploop.view.store.history import History
 
-# A slow swing, and one that has just ended, is looked for in so many windows; growth and decay are told beyond these
-# ratios of the two halves.
+# A slow swing, or one that has just ended, is looked for in this many windows; growth and decay are reported beyond
+# these ratios of the two halves.
 _LONG = 4
 _DIES, _GROWS = 0.5, 2.0
 _SWINGS = ("dying away", "growing", "swinging")
-# At rest, position stays within so many times what counts as a swing, once to either side; beyond rounding. Force stays
-# within this share of the largest.
+# At rest, the position stays within this multiple of what counts as a swing, once to either side, plus rounding. The
+# force stays within this share of the largest.
 _REST, _RIPPLE, _LEAST_RIPPLE_N = 2.0 + 1e-6, 0.02, 1e-3
 _WHY = {
     "settling": "Its numbers are those so far: no word before {window:g} s in one regime, since {begin}.",
@@ -47,15 +47,15 @@ class Sight:
 
     Attributes:
         word: a key of the rules; ``why`` is a sentence.
-        so_far_word: what the word would be if the interval were a whole window; "" where nothing can be told.
+        so_far_word: what the word would be if the interval were a whole window; "" where nothing can be said.
         from_s, to_s: the interval that the word is about; numbers are of its newest window.
-        so_far: whether the interval is shorter than a window, so that no word is told yet.
+        so_far: whether the interval is shorter than a window, so that no word is given yet.
         oscillation_m, ripple_N: widths of position and of applied force about their straight trends, peak to peak; that
-            of the position as it is, where the trend of a swing that is cut off makes it no narrower.
-        force_swing_N: the applied force as it is, peak to peak.
-        rests: whether the position swung by no more than what counts in the newest window.
-        frequency_Hz: of the line of the position where one stands out, else of that of the force; None for none.
-        stiffness_N_m: mean of force over penetration at the ticks in contact; None of none.
+            of the position with its trend, where the trend of a swing that is cut off makes it no narrower.
+        force_swing_N: width of the applied force with its trend, peak to peak.
+        rests: whether the position, in the newest window, swung by no more than what counts as a swing.
+        frequency_Hz: of the line of the position if one stands out, else of the line of the force; None without one.
+        stiffness_N_m: mean of force over penetration at the ticks in contact; None without any.
     """
 
     word: str
@@ -81,8 +81,8 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
 
     Args:
         since: tick of the last change of the loop, or of its start: what was before is another regime. So is what was
-            before a contact that came after more than a window without one.
-        resolution_m: of the encoder; swings within it do not count. 0 without one.
+            before a contact that came after more than a window without contact.
+        resolution_m: of the encoder; swings within it do not count. 0 without an encoder.
     """
     rate, window = history.time.control_rate, window_ticks(history.time.control_rate)
     known = max(history.steps.full_from_tick, history.ticks.full_from_tick, history.first_tick or 0)
@@ -132,7 +132,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     so_far_word, word = word, "settling" if so_far else word
     line = main_line(recent[0, ::n], rate) if width > _REST * swing_m else None
     line = line or (main_line(recent[1, ::n], rate) if ripple else None)
-    # What swings without a line does so as often as it crosses its middle.
+    # The frequency of a swing without a line follows from how often it crosses its middle.
     hertz = line.frequency_Hz if line else crossings / (2.0 * seen_s) if so_far_word in _SWINGS else None
     hertz = None if so_far_word == "no swing seen" else hertz
     why = _WHY[word if so_far else why or word].format(
@@ -162,7 +162,7 @@ def _contact(history: History, first: int, end: int) -> tuple[np.ndarray, float 
 
 
 def _ripples(force: np.ndarray, size: int) -> list[tuple[float, bool]]:
-    """Returns the width of force about its straight trend in windows of a size, the newest first, and if it counts."""
+    """Returns the width of force about its straight trend, and if it counts, in windows of a size, the newest first."""
     windows = [force[max(0, stop - size) : stop] for stop in range(len(force), 3, -size)]
     widths = [float(np.ptp(about_trend(window))) for window in windows]
     least = [max(_LEAST_RIPPLE_N, _RIPPLE * float(np.abs(window).max())) for window in windows]

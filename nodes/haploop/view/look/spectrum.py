@@ -1,4 +1,4 @@
-"""Amplitude spectra of force and position, and the line that stands out of one."""
+"""Amplitude spectra of force and position, and the line that stands out in one."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 
 from haploop.logger.verdict.about_trend import about_trend
 
-# The line is told where it holds this share of all that swings; below, there are many lines or noise.
+# A line is reported if it holds this share of all that swings; below, there are many lines or noise.
 _STANDS_OUT = 0.25
-# Lines this many resolved frequencies beside the highest are part of it: a Hann window is as wide.
+# Lines up to this many resolved frequencies beside the highest are part of it: a Hann window is that wide.
 _HALF_WIDTH = 2
 _FEWEST = 16
 
@@ -45,13 +45,13 @@ def amplitudes(samples: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray
 
 
 def main_line(samples: np.ndarray, rate: float, above_Hz: float = 0.0) -> Line | None:
-    """Returns the line that stands out of the spectrum of samples, shape (count,); None where none does.
+    """Returns the line that stands out in the spectrum of samples, shape (count,); None if none does.
 
-    Under a window of Hann a sine that lies d lines beside the highest, of height h, has neighbours of
+    Under a Hann window, a sine that lies d lines beside the highest, of height h, has neighbours of
     h (1 - d) / (2 + d) and h (1 + d) / (2 - d), and the amplitude h pi d (1 - d^2) / sin(pi d): its frequency and
-    height follow from the three without a bias, but for what leaks from other lines. None too where fewer than three
-    periods were seen, for which a frequency is a guess. Of what is no faster than ``above_Hz`` nothing counts, nor what
-    leaks from there: lower beside it than at its own place it is no line.
+    height follow from the three without bias, except for leakage from other lines. The result is None, too, if fewer
+    than three periods were seen, for which a frequency is a guess. What is no faster than ``above_Hz`` does not count,
+    nor does leakage from there: a peak with a higher neighbour at the next lower frequency is no line.
     """
     if len(samples) < _FEWEST or not np.isfinite(samples).all():
         return None
@@ -65,12 +65,12 @@ def main_line(samples: np.ndarray, rate: float, above_Hz: float = 0.0) -> Line |
 
 
 def lobe(peak: int) -> slice:
-    """Returns where in a spectrum what belongs to the line with this peak is."""
+    """Returns the part of a spectrum that belongs to the line with this peak."""
     return slice(max(0, peak - _HALF_WIDTH), peak + _HALF_WIDTH + 1)
 
 
 def line_at(at: np.ndarray, height: np.ndarray, peak: int, share: float) -> Line:
-    """Returns the line of a peak in a spectrum, its frequency and width between the lines as of ``main_line``."""
+    """Returns the line of a peak in a spectrum, with frequency and width interpolated as in ``main_line``."""
     offset = 0.0
     if peak + 1 < len(height):
         low, mid, high = height[peak - 1 : peak + 2]

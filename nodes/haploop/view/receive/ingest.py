@@ -30,7 +30,7 @@ _NOT_SHOWN, _SAMPLED = ("timestamp", "moved"), ".sampled"
 def ingest(history: History, frames: Sequence[tuple[str, Frame]]) -> Message:
     """Appends the blocks of these messages to a history; returns the newest status of the logger, {} for none.
 
-    Blocks without a gap between them are taken at once.
+    Blocks without a gap between them are taken together.
     """
     blocks: dict[str, list[Block]] = {}
     status: Message = {}
@@ -72,7 +72,7 @@ def _follows(one: Block, other: Block) -> bool:
 
 
 def _joined(run: list[Block], names: Iterable[str], shared: int = 0) -> dict[str, np.ndarray]:
-    """Joins columns of blocks, but for the last bytes of all but the last, which a neighbour shares."""
+    """Joins columns of blocks, without the last ``shared`` bytes of all but the last block: the next one has them."""
     *earlier, last = [block["columns"] for block in run]
     until = -shared or None
     return {
@@ -116,7 +116,7 @@ class Backfill:
         self.history = History(time, 0)
 
     def read(self) -> None:
-        """Reads on, up to the present end of the log; raises OSError or LogError where none can be read."""
+        """Reads on, up to the present end of the log; raises OSError or LogError where no log can be read."""
         self._log = self._log or LogStream(self._out, topics=("/plant", "/controller", "/energy"))
         for batch in self._log:
             self._take(batch)

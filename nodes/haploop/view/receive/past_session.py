@@ -1,4 +1,4 @@
-"""The session of a run that is over, made of its log: as if its telemetry had been received to the end."""
+"""The session of a run that is over, made from its log: as if its telemetry had been received to the end."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from haploop.view.store.history import History
 
 
 class PastSession(RunSession):
-    """Reads a recorded run, which takes as long as its log is; ``run`` is what it was found as.
+    """Reads a recorded run, which takes longer the longer its log is; ``run`` is what it was found as.
 
     Raises:
         OSError, LogError: its log cannot be read.

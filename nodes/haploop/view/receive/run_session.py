@@ -1,4 +1,4 @@
-"""The session of one run: its telemetry and events from joining it to its end, then its summary."""
+"""The session of one run: its telemetry and events from joining to the end of the run, then its summary."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class RunSession:
     """Joins a run, which may take a while, and keeps all that is received of it.
 
     Attributes:
-        scene, time, out: the resolved scene, its integers, the run's directory.
+        scene, time, out: the resolved scene, its timebase, the run's directory.
         history: telemetry received, and what was logged before once ``prepend`` has been called.
         status: newest status of the logger.
         changes: swaps and sets, with what was before them.
         outcome: "" while the run goes on, then "ended" or "failed"; ``why`` is a sentence, if there is one.
-        given_up: whether nobody is there any more who could judge the run.
+        given_up: whether nobody is left who could judge the run.
 
     Raises:
         Refused, Aborted: the run did not let this viewer in.
@@ -83,7 +83,7 @@ class RunSession:
             now = at_work(self.scene, changes_of(self.events))
             self.history.at_work = AtWork(now.dissipation, now.wall)
         now = wall_clock.monotonic()
-        if self.clock.status.get("paused"):  # nor does the rate after it count the standstill
+        if self.clock.status.get("paused"):  # the rate after a pause does not count the standstill either
             self._seen.clear()
         if self.history.first_tick is not None:
             self._seen.append((now, self.history.end_tick))
@@ -130,7 +130,7 @@ class RunSession:
         self.read_summary()
 
     def end_without_launcher(self) -> None:
-        """Ends the session where the launcher has gone: in order, its last messages perhaps lost, or killed."""
+        """Ends the session after the launcher has gone, in order with its last messages perhaps lost, or killed."""
         self.poll()
         if not self.outcome:
             self.end("ended", "")
@@ -154,11 +154,11 @@ class RunSession:
 
     @property
     def verdict_is(self) -> str:
-        """Returns what there is of a verdict.
+        """Returns the state of the verdict, in a word.
 
-        ``seen`` in the last half second, ``judged`` once the run has ended, or nothing can tell more; between the two
-        ``awaited``, or ``abandoned`` where its launcher has gone; ``unjudged`` of a run that was too long, ``foreign``
-        of one of which a half was not haploop's own; ``unknown`` where no summary can be read.
+        ``seen`` in the last half second, ``judged`` once the run has ended, or if nothing can tell more; between the
+        two ``awaited``, or ``abandoned`` if its launcher has gone; ``unjudged`` for a run that was too long,
+        ``foreign`` for one whose plant or controller was not haploop's own; ``unknown`` if no summary can be read.
         """
         if not self.summary:
             return "unknown" if self.outcome == "ended" else "seen"
@@ -179,7 +179,7 @@ class RunSession:
 
     @property
     def is_complete(self) -> bool:
-        """Tells whether every tick from the start on was surely received."""
+        """Tells whether every tick from the start on was certainly received."""
         begun = all(series.first_tick == 0 for series in self.history.all_series)
         return begun and not self.skipped_ticks and self.outcome != "failed"
 

@@ -16,12 +16,12 @@ from haploop.protocol.transport.wire import Message
 
 # How often the clock is asked for its status.
 _ASK_S = 0.5
-# Kinds of events after which the options may be others.
+# Kinds of events after which the options may have changed.
 _CHANGES = ("swap", "set", "refused", "restored")
 
 
 class CommandFailed(Exception):
-    """Raised where a run did not carry out a command; the message says why, for people."""
+    """Raised where a run did not carry out a command; the message tells people why."""
 
 
 class Run(Protocol):
@@ -43,12 +43,12 @@ class Run(Protocol):
     def is_here(self) -> bool: ...
 
     def make_context(self) -> SecureContext:
-        """Makes a context whose sockets may connect to the run; nobody asks for one of a run that is over."""
+        """Makes a context whose sockets may connect to the run; it is not called for a run that is over."""
         ...
 
 
 class PastRun(Run, Protocol):
-    """A recorded run that is over; ``out`` is its folder, ``told`` what came of it and when, in few words."""
+    """A recorded run that is over; ``out`` is its folder, ``told`` its result and time, in a few words."""
 
     @property
     def out(self) -> Path: ...
@@ -65,10 +65,10 @@ class PastRun(Run, Protocol):
 
 
 class Runs(Protocol):
-    """All runs of this user; implemented by whoever starts a viewer."""
+    """All runs of this user; implemented by the program that starts a viewer."""
 
     def live(self) -> Sequence[Run]:
-        """Returns the runs that live now, the oldest first."""
+        """Returns the runs that are live now, the oldest first."""
         ...
 
     def past(self) -> Sequence[PastRun]:
@@ -76,7 +76,7 @@ class Runs(Protocol):
         ...
 
     def stiffness_limit(self, scene: Scene) -> float | str | None:
-        """Returns the largest wall stiffness at which a loop stays stable by its linear map, N/m, or why none is."""
+        """Returns the largest wall stiffness at which a loop is stable by its linear map, N/m, or why none is known."""
         ...
 
     def has_launcher(self, run: Any) -> bool:
@@ -89,7 +89,7 @@ class Runs(Protocol):
 
 
 class ClockAnswers:
-    """Keeps the latest answers of the clock of a run, asked for now and then beside the task that draws.
+    """Keeps the latest answers of a run's clock, which is asked now and then in parallel to the task that draws.
 
     Attributes:
         status: the answer to ``status``, {} before the first.
@@ -112,7 +112,7 @@ class ClockAnswers:
         seen = -1
         while True:
             changes = sum(any(kind in event for kind in _CHANGES) for _, event in self._events)
-            with contextlib.suppress(CommandFailed):  # it is about to end
+            with contextlib.suppress(CommandFailed):  # the run is about to end
                 _, self.status = await self._ask("status", {})
                 if changes != seen:
                     self.options = finite((await self._ask("options", {}))[1])

@@ -15,7 +15,7 @@ class MissingExtra(RuntimeError):
 
 
 def check_installed() -> None:
-    """Looks for the packages that the page needs, without importing them; raises MissingExtra without one."""
+    """Looks for the packages that the page needs, without importing them; raises MissingExtra if one is missing."""
     if importlib.util.find_spec("aiohttp") is None or _uplot() is None:
         raise MissingExtra(
             "haploop view needs aiohttp and uplot-python; install them with pip install 'haploop[view]'."
@@ -23,7 +23,7 @@ def check_installed() -> None:
 
 
 def _uplot() -> Path | None:
-    """Returns the folder of uPlot's files in the installed package, whose import would load far more."""
+    """Returns the folder of uPlot's files in the installed package; importing that would load far more."""
     spec = importlib.util.find_spec("uplot")
     places = spec.submodule_search_locations if spec else None
     folders = [Path(place, "static") for place in places or ()]

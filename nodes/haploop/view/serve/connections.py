@@ -1,4 +1,4 @@
-"""The connections of the page's server: whoever says nothing is let go, and noise is not told."""
+"""The connections of the page's server: silent ones are closed, and noise is not logged."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import logging
 from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
 
-# A connection that has asked for nothing is closed after so long, the oldest at once where there are so many of them.
+# A connection that has requested nothing is closed after this time; if there are this many of them, the oldest at once.
 SILENT_S, MOST_SILENT = 10.0, 100
 _LOOK_S = 1.0
 
@@ -38,7 +38,7 @@ class Connections:
                 one.transport.abort()
 
     async def close_silent(self) -> None:
-        """Closes what has been silent for ``SILENT_S``, until it is cancelled."""
+        """Closes connections that have been silent for ``SILENT_S``, until it is cancelled."""
         while True:
             self._heard.intersection_update(self._server.connections)
             now = asyncio.get_running_loop().time()
@@ -48,7 +48,7 @@ class Connections:
 
 
 def quiet_logger() -> logging.Logger:
-    """Returns a logger that tells what fails in this server, but not what was no HTTP; that is answered with 400."""
+    """Returns a logger of what fails in this server, but not of what is not HTTP; that is answered with 400."""
     logger = logging.getLogger(__name__)
     logger.addFilter(_is_own_failure)
     return logger

@@ -1,8 +1,8 @@
-"""Access control: programs of this machine alone may look, whoever runs them, and steer only with the printed link.
+"""Access control: only programs on this machine may look, whoever runs them, and may steer only with the printed link.
 
-A page from elsewhere reaches a server on loopback too, through the browser of whoever visits it. It can make that
-browser send requests, but not with another Host (its own name may resolve to this machine: DNS rebinding), not with
-another Origin, and it can neither read the answers nor guess a token.
+A page from elsewhere can reach a server on loopback, too, through its visitor's browser. It can make that browser send
+requests, but not with a Host (its own name may resolve to this machine: DNS rebinding) or an Origin other than its own,
+and it can neither read the answers nor guess a token.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class Guard:
 
     Attributes:
         link: the address with the token in its fragment, which no browser sends to any server.
-        one_time_link: one that leads to ``link`` once: all users can see the command line that starts a browser.
+        one_time_link: a link that leads to ``link`` once: all users can see the command line that starts a browser.
     """
 
     def __init__(self, port: int) -> None:
@@ -49,7 +49,7 @@ class Guard:
 
     @property
     def headers(self) -> dict[str, str]:
-        """Returns the headers of every answer: nothing from elsewhere in it, and no page of others around it."""
+        """Returns the headers of every answer: they allow nothing from elsewhere in it, and no other page around it."""
         sockets = " ".join(f"ws://{host}" for host in self._hosts)
         return {
             "Content-Security-Policy": (

@@ -1,8 +1,8 @@
 """The connection of one page: snapshots, state and events go out, its viewport and commands come in.
 
-At most four snapshots are on their way to a page that has not said yet that it drew them: a slow or hidden one costs
-nothing, and one whose answers take as long as four pictures, as beside a run that wants every core, still gets each.
-What stands beside the charts over time comes with one in three, and with the last: nobody reads it more often.
+At most four snapshots are on their way to a page that has not yet reported drawing them: a slow or hidden page costs
+nothing, and one whose answers take as long as four pictures, as beside a run that uses every core, still gets each.
+What stands beside the charts over time comes with one snapshot in three, and with the last: nobody reads it more often.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from haploop.view.receive.runs import CommandFailed
 from haploop.view.serve.guard import Guard
 from haploop.view.viewer import Viewer
 
-# The state goes out at least so often.
+# The state goes out at least this often.
 _STATE_S = 0.4
 # A close frame has no room for a longer reason, in bytes.
 _LONGEST_REASON = 120
 _FEWEST_POINTS, _MOST_POINTS = 50, 8000
 _LONGEST_S = 1e9
-# What stands beside the charts over time comes with one snapshot of so many: it is read more than watched.
+# What stands beside the charts over time comes with one snapshot in this many: it is read more than watched.
 _BESIDE_EVERY = 3
-# Snapshots that go out before the page has drawn them.
+# Most snapshots that go out before the page has drawn them.
 _MOST_UNDRAWN = 4
 # Commands that a page may send; the clock answers more.
 _VERBS = ("pause", "resume", "step", "stop", "swap", "set", "undo", "pace", "open", "overlay")
@@ -66,7 +66,7 @@ class Page:
             reason = str(error).encode()[:_LONGEST_REASON].decode(errors="ignore").encode()
             await self._socket.close(code=WSCloseCode.POLICY_VIOLATION, message=reason)
         except ConnectionError:
-            pass  # it has gone while it was being answered
+            pass  # the page has gone while it was being answered
         finally:
             showing.cancel()
             with contextlib.suppress(asyncio.CancelledError):
@@ -105,19 +105,19 @@ class Page:
         return await session.clock.command(command.verb, command.arguments)
 
     async def _send_updates(self) -> None:
-        """Sends what is new after every update; a page that does not read blocks this task alone."""
+        """Sends what is new after every update; a page that does not read blocks only this task."""
         try:
             while True:
                 await self._send_news()
                 await self._send_snapshot()
                 await self._viewer.wait_for_update()
         except ConnectionError:
-            pass  # it has gone
+            pass  # the page has gone
         finally:
             await self._socket.close()
 
     async def _send_news(self) -> None:
-        """Sends state and events when they have changed, the state anyway every 0.4 s."""
+        """Sends state and events when they have changed, the state in any case every 0.4 s."""
         now, session = wall_clock.monotonic(), self._viewer.session
         known = session and (session, len(session.events), session.clock.options is None)
         if known != self._sent_events:
@@ -139,7 +139,7 @@ class Page:
         if made and made[0] == self._sent_snapshot:
             if self._until_beside == _BESIDE_EVERY - 1:
                 return
-            made, beside = self._viewer.snapshot(self._viewport, True), True  # the last picture is whole
+            made, beside = self._viewer.snapshot(self._viewport, True), True  # the last picture is complete
         if made:
             self._sent_snapshot, self._undrawn = made[0], self._undrawn + 1
             self._until_beside = (_BESIDE_EVERY if beside else self._until_beside) - 1
@@ -150,7 +150,7 @@ class Page:
 
 
 class BadMessage(ValueError):
-    """Raised where a page sent no valid message; the text says what was expected."""
+    """Raised where a page sent an invalid message; the text says what was expected."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def parse_message(text: str) -> Viewport | Command | None:
     """Returns what a text says: ``watch`` as a viewport, ``command`` as a command, ``drawn`` of a snapshot as None.
 
     Raises:
-        BadMessage: it says anything else.
+        BadMessage: the text says anything else.
     """
     try:
         message = json.loads(text)

@@ -19,20 +19,20 @@ from haploop.view.serve.guard import HOST, Guard
 from haploop.view.serve.page import Page
 from haploop.view.viewer import Viewer
 
-# What a page says is short.
+# Messages from a page are short.
 _LARGEST_MESSAGE = 64 * 1024
-# A page that does not answer for so long is gone.
+# A page that does not answer for this long is gone.
 _HEARTBEAT_S = 20.0
-# How long pages that have been told to close, and requests under way, are waited for at the end.
+# How long the end waits for pages that have been told to close, and for requests under way.
 _GOODBYE_S = 1.0
-# A page that comes back within so long was loaded anew, not closed.
+# A page that comes back within this time was reloaded, not closed.
 _ANEW_S = 2.0
-# So much may wait in the system for a page that is slow; then it gets fewer pictures, but none that are old.
+# Most data that may wait in the system for a slow page; beyond that it gets fewer pictures, but no old ones.
 _WAITING_BYTES = 256 * 1024
 
 
 def make_app(viewer: Viewer, guard: Guard, heard: Heard, on_closed: Callable[[], None] | None) -> web.Application:
-    """Makes the web application, which notes in ``heard`` the connections from which a request has come.
+    """Makes the web application, which records in ``heard`` the connections from which a request has come.
 
     Once every page that was open has been closed it calls ``on_closed``, if there is one.
 
@@ -107,7 +107,7 @@ class PortTaken(OSError):
 
 
 def listen(port: int) -> socket.socket:
-    """Opens a socket that listens on loopback, at any free port for 0; raises PortTaken where it cannot be had."""
+    """Opens a socket that listens on loopback, at any free port for 0; raises PortTaken if it cannot be used."""
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

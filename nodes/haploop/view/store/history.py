@@ -15,11 +15,11 @@ from haploop.protocol.transport.telemetry import Block
 from haploop.view.store.lod_series import LodSeries
 
 Columns = Mapping[str, np.ndarray]
-# Ticks held in full, and plant steps, of which fewer are held where a tick has very many.
+# Ticks held in full; plant steps, which allow fewer ticks where a tick has very many; the fewest ticks.
 _RECENT_TICKS, _RECENT_STEPS, _LEAST_TICKS = 16_384, 131_072, 512
-# Books of elements that are kept, the newest: every change of a parameter opens one.
+# Number of books of elements that are kept, the newest: every change of a parameter opens one.
 _MOST_BOOKS = 16
-# Own columns of elements that are kept at once, so that they crowd no force out.
+# Number of own columns of elements that are kept at once, so that they crowd out no force.
 _MOST_OWN = 16
 _NO_UNITS: Mapping[str, str] = MappingProxyType({})
 TRUE, WALL_BOOK, EARLIER = ".true", "wall.true", "earlier.true"
@@ -57,10 +57,10 @@ class History:
         steps: at plant steps: x, tip_x and hand_x where there are such bodies, and the force on the device.
         ticks: at control ticks: x_measured, v, forces of the wall and of each element (``element.<place>.<kind>``),
             their total, the wall's position and stiffness (NaN without one), the mass of each virtual inertia while
-            it is at work, else 0 (``mass.<place>.<kind>``), and columns of their own (``own.<place>.<kind>.<name>``).
-        own: unit and label of each of these columns of elements, by name.
+            it is at work, else 0 (``mass.<place>.<kind>``), and own columns (``own.<place>.<kind>.<name>``).
+        own: unit and label of each of these own columns of elements, by name.
         energy: at ticks: the true book of the wall and of each element (``<name>.true``; ``earlier.true`` is the sum of
-            those that are not kept apart), the plant's books, those that part the wall's by cause, and the residual.
+            those not kept separately), the plant's books, those that split the wall's by cause, and the residual.
         opened: tick at which each column of ``energy`` began; None where it may have begun before what is known.
         at_work: at the newest ticks of the controller.
         stop_tick: tick at which the plant has ended; None before.
@@ -83,7 +83,7 @@ class History:
         self._told: tuple[object, AtWork] = None, self.at_work
 
     def at_work_in(self, block: Block) -> AtWork:
-        """Returns what was at work in a block of the controller; read once where block after block tells the same."""
+        """Returns what was at work in a block of the controller; decoded once if successive blocks report the same."""
         told = block["elements"], block["wall"]
         if told != self._told[0]:
             self._told = told, AtWork.of_block(block)
@@ -91,7 +91,7 @@ class History:
 
     @property
     def first_tick(self) -> int | None:
-        """Returns the first tick of which anything is known; None before the first."""
+        """Returns the first tick of which anything is known; None before anything is."""
         return min((series.first_tick for series in self.all_series if series.first_tick is not None), default=None)
 
     @property
@@ -125,7 +125,7 @@ class History:
             self.append_steps(tick, {name: np.concatenate([value, beyond]) for name, value in state.items()})
 
     def append_ticks(self, tick: int, columns: Columns, at_work: AtWork, units: Mapping[str, str] = _NO_UNITS) -> None:
-        """Appends rows of the controller, x, v, wall, total and ``dissipation.<place>``, during which this was at work.
+        """Appends rows of the controller, x, v, wall, total and ``dissipation.<place>``, all with this ``at_work``.
 
         An element without a column has not come yet. ``units`` has the units of ``dissipation.<place>.<name>``.
         """
@@ -163,7 +163,7 @@ class History:
         self._append(self.energy, tick, kept)
 
     def extend_from(self, other: History) -> None:
-        """Appends from another history of the same run what this one has not reached."""
+        """Appends what another history of the same run has and this one has not reached."""
         for own, its in zip(self.all_series, other.all_series, strict=True):
             own.extend_from(its)
         if other.ticks.first_tick is not None:

@@ -6,16 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Shorter groups are gone through place by place, each in one piece of memory: several times as quick as group by group.
+# Shorter groups are processed place by place, each contiguous in memory: several times as fast as group by group.
 _LONG_GROUP = 96
 
 
 def extremes(values: np.ndarray, group: int) -> np.ndarray:
-    """Returns the least and the greatest of every ``group`` consecutive values, the least first where they rise.
+    """Returns the least and the greatest of every ``group`` consecutive values, the least first where the values rise.
 
-    They rise unless the last is less than the first: so the two stand in the order in which they came wherever the
+    They rise unless the last is less than the first: so the two are in the order in which they occurred wherever the
     values turn once at most. A line through the result covers the same band as one through all values, and the extremes
-    of such extremes are those of the values themselves, so decimation can be repeated. NaN counts for nothing.
+    of such extremes are those of the values themselves, so decimation can be repeated. NaN is ignored.
 
     Args:
         values: shape (columns, count), ``count`` a multiple of ``group``.
@@ -37,15 +37,15 @@ def extremes(values: np.ndarray, group: int) -> np.ndarray:
 class Ring:
     """Holds at least the newest ``capacity`` values of each of several columns.
 
-    There is room for twice as many: when it is full, the newest half moves to the front, so that what is asked for is
-    always one piece of memory and a value is moved once at most, on average.
+    There is room for twice as many: when it is full, the newest half moves to the front, so that requested values are
+    always contiguous in memory and a value is moved once at most, on average.
 
     Attributes:
         start, end: numbers of the first value held and of the one after the last; the first ever appended has number 0.
     """
 
     def __init__(self, capacity: int, columns: int) -> None:
-        """Makes an empty one with so many columns at first."""
+        """Makes an empty ring with ``columns`` columns at first."""
         self._values = np.full((columns, 2 * capacity), np.nan)
         self.capacity = capacity
         self.start = self.end = 0
@@ -59,10 +59,10 @@ class Ring:
         self.extend(values.shape[1])[:] = values
 
     def extend(self, count: int) -> np.ndarray:
-        """Returns room for ``count`` values more, at most the capacity, (columns, count), which the caller fills."""
+        """Returns room for ``count`` more values, at most the capacity, (columns, count), which the caller fills."""
         used = self.end - self.start
         if used + count > self._values.shape[1]:
-            for column in self._values:  # one by one they are moved in place, all at once by way of a copy
+            for column in self._values:  # one by one they are moved in place; all at once would need a copy
                 column[: self.capacity] = column[used - self.capacity : used]
             self.start, used = self.end - self.capacity, self.capacity
         self.end += count

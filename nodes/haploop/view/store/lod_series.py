@@ -1,4 +1,4 @@
-"""Series at several levels of detail: the newest rows in full, those of the whole run ever coarser."""
+"""Series at several levels of detail: the newest rows in full, those of the whole run more and more coarsely."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from haploop.view.store.lod_level import LodLevel, Ring, extremes
 
 # Buckets of a level that make one of the next: fewer levels cost less, and twice the buckets make up for it.
 FOLD = 4
-# Rows and ticks of a bucket of the first coarse level, at least: finer ones reach no further back than the rows.
+# Least rows and ticks of a bucket of the first coarse level: finer ones reach no further back than the rows.
 _LEAST_ROWS, _LEAST_TICKS = 16, 4
-# Buckets that a coarse level holds at least, two values each.
+# Least number of buckets that a coarse level holds, two values each.
 _BUCKETS = 4096
 # Ticks for which buckets are made at once, and buckets of the coarser levels; fewer are not worth the calls.
 _AT_ONCE_TICKS, _AT_ONCE_BUCKETS = 128, 64
-# So few values are looked at row by row: the calls for level upon level would take longer.
+# Up to this many values are read row by row: the calls for level after level would take longer.
 _FEW_VALUES = 8192
-# Envelopes that are kept, of which the next ones of the same names and buckets make what is new alone.
+# Envelopes that are kept, so that the next ones of the same names and buckets compute only what is new.
 _MOST_KNOWN = 16
 # Ticks of ranges that are taken from another series at once.
 _RANGES_AT_ONCE = 4096
@@ -27,12 +27,12 @@ MOST_COLUMNS = 48
 
 
 class LodSeries:
-    """Keeps rows of named columns, a whole number of them a tick, from tick ``origin`` on.
+    """Keeps rows of named columns, a whole number of rows per tick, from tick ``origin`` on.
 
     Level 0 holds the newest rows, of ``recent_ticks`` at least. Every other level holds the least and the greatest of
-    buckets of some ticks, ``FOLD`` times as many as on the level before it; before a level would forget its oldest
-    buckets there is a next one, so that some level always reaches back to the origin. So memory grows with the
-    logarithm of the run's length alone.
+    buckets of some ticks, ``FOLD`` times as many as on the level before it. Before a level would forget its oldest
+    buckets, a next one is added, so that some level always reaches back to the origin. So memory grows only with the
+    logarithm of the run's length.
 
     Attributes:
         first_tick: first tick that is known; None before anything is.
@@ -45,11 +45,11 @@ class LodSeries:
         self.first_tick: int | None = None
         self._columns: dict[str, int] = {}
         self._found: dict[tuple[str, ...], tuple[list[int], np.ndarray]] = {}
-        # By names and ticks of a bucket: the first tick of the last envelope, and those of its buckets that are full.
+        # By names and ticks of a bucket: the first tick of the last envelope, and its buckets that are complete.
         self._known: dict[tuple[tuple[str, ...], int], tuple[int, np.ndarray]] = {}
         self._levels = [LodLevel(Ring(recent_ticks * rows_per_tick, 0), 1, rows_per_tick)]
         self._add_level()
-        # No level is given more at once than half of what it surely holds, so that nothing is lost on the way up.
+        # No level is given more at once than half of what it certainly holds, so that nothing is lost on the way up.
         self._at_once = min(recent_ticks, _BUCKETS * self._levels[1].ticks) * rows_per_tick // 2
 
     @property
@@ -74,14 +74,14 @@ class LodSeries:
         self._levels.append(LodLevel(Ring(2 * _BUCKETS, len(self._columns)), ticks, 2))
 
     def begin(self, tick: int) -> None:
-        """Notes that rows begin at ``tick``; the first call counts."""
+        """Records that rows begin at ``tick``; the first call counts."""
         if self.first_tick is None:
             self.first_tick = max(tick, self.origin)
 
     def append(self, tick: int, columns: Mapping[str, np.ndarray]) -> None:
         """Appends the rows of some ticks from ``tick`` on, name -> array of shape (ticks * rows_per_tick,).
 
-        Ticks that are known already are passed over; ticks missing in between, and columns without rows here, are NaN.
+        Ticks that are known already are skipped; ticks missing in between, and columns without rows here, are NaN.
         """
         rows = len(next(iter(columns.values())))
         known = (self.end_tick - tick) * self.rows_per_tick
@@ -97,7 +97,7 @@ class LodSeries:
         self._take(rows - known, {name: column[known:] for name, column in columns.items()})
 
     def _open(self, name: str, present: Collection[str]) -> None:
-        """Adds a column; where there are too many, in place of the oldest that is not present any more."""
+        """Adds a column; if there are too many, it replaces the oldest one that is no longer present."""
         self._found.clear()
         self._known.clear()
         if len(self._columns) < MOST_COLUMNS:
@@ -122,7 +122,7 @@ class LodSeries:
         below = self._levels[depth]
         if depth + 1 == len(self._levels):
             if below.ring.end < below.ring.capacity // 4:
-                return  # far from forgetting anything, and short enough to be looked at as it is
+                return  # far from forgetting anything, and short enough to be read as it is
             self._add_level()
         above = self._levels[depth + 1]
         buckets = (below.end - above.end) // above.ticks
@@ -134,8 +134,8 @@ class LodSeries:
     def extend_from(self, other: LodSeries) -> None:
         """Appends what another series holds and this one has not reached.
 
-        Of what that holds as ranges only, least and greatest of an interval stand in it by turns, and all before its
-        end counts as ranges here, too.
+        Where the other series holds only ranges, rows alternate between the least and the greatest of an interval, and
+        everything before the end of the ranges counts as ranges here, too.
         """
         n, begun = (
             self.rows_per_tick,
@@ -181,7 +181,7 @@ class LodSeries:
         return found
 
     def _places(self, names: Sequence[str]) -> tuple[list[int], np.ndarray]:
-        """Returns where among these names those are that are known, and their columns' places; kept, for speed."""
+        """Returns where the known ones are among these names, and the places of their columns; kept, for speed."""
         if (key := tuple(names)) not in self._found:
             rows = [row for row, name in enumerate(names) if name in self._columns]
             self._found[key] = rows, np.array([self._columns[names[row]] for row in rows], dtype=np.intp)
@@ -226,7 +226,7 @@ class LodSeries:
     ) -> None:
         """Fills in an envelope from column ``filled`` on, up to the last bucket that has begun."""
         at, end = from_tick + filled // 2 * bucket_ticks - self.origin, to_tick - self.origin
-        # From the coarsest level that is fine enough on; what has not been propagated to it comes from the finer ones.
+        # Begins at the coarsest level that is fine enough; what has not been propagated to it comes from finer ones.
         levels = [(level, level.end) for level in reversed(self._levels) if level.ticks <= bucket_ticks]
         rows, few = self._levels[0], _FEW_VALUES // (self.rows_per_tick * max(1, len(names)))
         for level, known in levels:
