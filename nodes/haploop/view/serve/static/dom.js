@@ -1,4 +1,4 @@
-// Short words for what every part of the page does to it.
+// Short functions for what every part of the page does to it.
 
 /** The element with this id. */
 export const byId = (id) => document.getElementById(id);
@@ -11,7 +11,7 @@ export function make(tag, attributes = {}, ...children) {
   return element;
 }
 
-/** Sets an element's text, touching it only if that changes: screen readers and layout are left in peace. */
+/** Sets an element's text, touching it only if that changes: screen readers and layout are not disturbed. */
 export function put(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
@@ -22,10 +22,10 @@ export function sign(element, shape, word) {
   put(element.querySelector("span"), word);
 }
 
-// What is due waits so long for the next picture, to be part of it: a picture of its own costs the browser as much again.
+// What is due waits this long for the next picture, to be part of it: a separate picture costs the browser as much again.
 const NEXT_PICTURE_MS = 50;
 
-/** A beat: what it makes of acts is done at most once in `gap_ms`, all in one picture, the last time with the last arguments. */
+/** A beat: acts wrapped by it are done at most once in `gap_ms`, all in one picture, the last time with the last arguments. */
 export function beat(gap_ms) {
   const waiting = new Map();
   let [due, timer] = [0, 0];
@@ -45,7 +45,7 @@ export function beat(gap_ms) {
   };
 }
 
-/** What texts need to be read: often enough for the eye, and one layout for all of them. */
+/** The beat for texts: often enough for the eye, and one layout for all of them. */
 export const seldom = beat(120);
 
 /** Tells `turned` whether an element can be seen, whenever that changes: what cannot be seen need not be drawn. */
@@ -54,8 +54,8 @@ export function onSight(element, turned) {
 }
 
 /**
- * The size of a box in whole pixels, as the browser last told it, and `turned` after each time that it was told. Nothing else
- * measures the box: what was measured between two layouts would stay when the box is again as it was told.
+ * The size of a box in whole pixels, as the browser last reported it; calls `turned` after each report. Nothing else
+ * measures the box: a size measured between two layouts would stay when the box is again as reported.
  */
 export function boxOf(element, turned) {
   const box = { width: 0, height: 0 };
@@ -67,7 +67,7 @@ export function boxOf(element, turned) {
   return box;
 }
 
-/** Keeps the pixels of a canvas those of its box; `again` after they have changed. No frame asks for the layout. */
+/** Keeps the pixels of a canvas equal to those of its box; calls `again` after they have changed. No frame asks for the layout. */
 export function fitCanvas(canvas, height_px, again) {
   new ResizeObserver(([{ contentRect }]) => {
     const [width, height] = [contentRect.width, height_px].map((px) => Math.round(px * devicePixelRatio));

@@ -3,7 +3,7 @@
 import { byId, make } from "./dom.js";
 
 const TYPES = "input[type=text], select, textarea";
-// These do something of their own with space and arrows.
+// These use space and arrows themselves.
 const PRESSES = "button, input, select, textarea, summary, a, [tabindex]";
 const OWN = new Set([" ", "ArrowLeft", "ArrowRight"]);
 

@@ -1,4 +1,4 @@
-// The page: what the server tells goes to the charts, tables and forms; what is done with them goes back to it.
+// The page: what the server sends goes to the charts, tables and forms; what is done with them goes back to it.
 
 import { Charts } from "./charts/charts.js";
 import { byId, put, seldom } from "./dom.js";
@@ -54,7 +54,7 @@ byId("save-picture").addEventListener("click", () => {
   queueMicrotask(() => savePicture(state)); // after the charts, which draw in microtasks of their own
 });
 byId("save-data").addEventListener("click", () => snapshot && saveData(snapshot, state));
-// The address keeps the token: the jump is made here.
+// The address has to keep the token, so the jump is made here.
 byId("to-forms").addEventListener("click", (event) => {
   event.preventDefault();
   byId("swap").scrollIntoView({ block: "center" });
@@ -80,7 +80,7 @@ function newRun() {
   viewport.live();
   charts.refit();
   swapForm.forget();
-  say({ ok: true, text: "" }); // an answer was of the run before
+  say({ ok: true, text: "" }); // an answer belongs to the run before
 }
 
 function showState() {
@@ -118,7 +118,7 @@ function onEvents(events) {
   redraw();
 }
 
-/** Every snapshot is a picture of its own: the server sends no fifth one before the first is drawn. */
+/** Every snapshot gets its own picture: the server sends no fifth one before the first is drawn. */
 function onSnapshot(buffer) {
   if (waiting.push(buffer) === 1) requestAnimationFrame(draw);
 }

@@ -1,4 +1,4 @@
-// What is on the page as files: a picture of its charts, and the numbers that they draw.
+// Saves what is on the page as files: a picture of its charts, and the numbers that they draw.
 
 import { byId, make } from "./dom.js";
 import { colour } from "./drawing/palette.js";
@@ -47,7 +47,7 @@ export function savePicture({ title, run }) {
   return new Promise((done) => picture.toBlob((blob) => done(save(blob, `haploop-${run}.png`))));
 }
 
-/** What stands above a chart: its lines that are shown with their looks and numbers, and notes. */
+/** What is written above a chart: the lines that are shown, with their looks and numbers, and notes. */
 function namesOf(chart) {
   const lines = [...chart.querySelectorAll(".legend li")].filter((one) => one.querySelector('[aria-pressed="true"]'));
   const notes = [...chart.querySelectorAll(".head .note, .line-name, figcaption")].filter((note) => note.innerText);
@@ -56,7 +56,7 @@ function namesOf(chart) {
   );
 }
 
-/** Names with their places, in as many rows as their width takes. */
+/** Names with their places, in as many rows as their width needs. */
 function placed(ctx, names, width, ratio) {
   let [x, row] = [GAP * ratio, 0];
   return names.map((name) => {

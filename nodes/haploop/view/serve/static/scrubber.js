@@ -22,7 +22,7 @@ export class Scrubber {
     fitCanvas(this.canvas, HEIGHT, () => this.last && this.draw(...this.last));
   }
 
-  /** Show the part that ends at this share of the run; at its end, what comes. */
+  /** Show the part that ends at this share of the run; at its end, what comes next. */
   move(share) {
     const { first_s: first, last_s: last, shown } = this.viewport;
     const span = this.viewport.span_s ?? shown[1] - shown[0];
@@ -46,14 +46,14 @@ export class Scrubber {
     if (overview) this.band(ctx, overview, across, height);
     ctx.fillStyle = colour("mark");
     for (const { t_s, changes } of marks) if (changes) ctx.fillRect(Math.round(across(t_s)), 0, ratio, height);
-    // As it was asked for: what is drawn comes a little later.
+    // The place that was asked for: what is drawn follows a little later.
     if (!this.isHeld) this.input.value = String(Math.round((STEPS * ((end ?? last) - first)) / (last - first)));
     this.input.setAttribute("aria-valuetext", `${from.toFixed(2)} to ${Math.min(to, last).toFixed(2)} s`);
     const decimals = last - first < 1 ? 3 : 1;
     put(byId("scrub-ends"), `${first.toFixed(decimals)}–${last.toFixed(decimals)} s`);
   }
 
-  /** The band between the extremes of each stretch, which come in pairs: a swing too fast for the strip has no zigzags. */
+  /** The band between the extremes of each stretch, which come in pairs: a swing too fast for the strip shows no zigzags. */
   band(ctx, { t0_s: t0, dt_s: dt, columns: [{ values }] }, across, height) {
     const [low, high] = extent([values]);
     const down = (value) => height * (0.1 + 0.8 * (high > low ? (high - value) / (high - low) : 0.5));

@@ -41,7 +41,7 @@ export function scaled(values, factor) {
   return other;
 }
 
-/** The newest number of a column that is there; NaN for none. */
+/** The newest number that a column has; NaN if it has none. */
 export function newest({ values, last }) {
   if (last !== undefined) return last ?? NaN;
   let i = values.length - 1;

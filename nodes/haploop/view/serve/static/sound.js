@@ -3,7 +3,7 @@
 import { byId } from "./dom.js";
 import { say } from "./steering/steering.js";
 
-// A force of this size, in N, is as loud as it gets; what stands still is silent.
+// A force of this size, in N, has full volume; a force that does not change is silent.
 const FULL_N = 1;
 const AHEAD_S = 0.08;
 

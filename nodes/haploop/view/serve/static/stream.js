@@ -1,11 +1,11 @@
-// The connection to haploop view. A lost one is opened again by itself.
+// The connection to haploop view. A lost one is opened again automatically.
 
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 2000;
 const LOST = "The connection to haploop view is lost, so nothing was sent.";
 const UNANSWERED = "The connection to haploop view was lost before the answer came; look whether it took effect.";
 
-/** The token of the link that haploop view printed; it stands after the #, which no server ever sees. */
+/** The token of the link that haploop view printed; it is the part after the #, which no server ever sees. */
 const token = () => new URLSearchParams(location.hash.slice(1)).get("token") ?? "";
 
 /** Whether the page was opened with a link that lets it steer. */
@@ -68,7 +68,7 @@ export class Stream {
     this.send(this.request);
   }
 
-  /** Have the run do something; the answer, {ok, text}, comes whatever happens. */
+  /** Send the run a command; the answer, {ok, text}, comes whatever happens. */
   command(verb, args) {
     const id = ++this.commands;
     return new Promise((answer) => {

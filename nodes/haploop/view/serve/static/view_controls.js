@@ -18,7 +18,7 @@ export class ViewControls {
     byId("later").addEventListener("click", () => viewport.shift(PART));
   }
 
-  /** Show how it is looked now; a run that is over has no more to come. */
+  /** Show the present view; from a run that is over, nothing more will come. */
   update(isOver = this.isOver) {
     this.isOver = isOver;
     const { span_s: span, frozen } = this.viewport;

@@ -16,7 +16,7 @@ export class Viewport {
     this.sound = false;
     // Times between which the charts measure: none, one (to the cursor) or two.
     this.measured = [];
-    // What there is to look at, and what is on the page now.
+    // What can be shown, and what is on the page now.
     this.first_s = 0;
     this.last_s = 0;
     this.shown = [0, 0];
@@ -26,19 +26,19 @@ export class Viewport {
     return this.end_s !== null;
   }
 
-  /** As the server wants to be asked. */
+  /** The request as the server expects it. */
   request() {
     return { span_s: this.span_s, points: this.points, end_s: this.end_s, panel: this.panel, sound: this.sound };
   }
 
-  /** So many seconds, or null for everything since the start. */
+  /** Show this many seconds, or null for everything since the start. */
   show(span_s) {
     this.span_s = span_s;
     if (span_s === null) this.end_s = null;
     this.changed();
   }
 
-  /** The next span of the row: +1 longer, -1 shorter. */
+  /** Take the next span of the row: +1 longer, -1 shorter. */
   widen(by) {
     const spans = SPANS_S.map((span) => span ?? Infinity);
     const now = this.span_s ?? Infinity;
@@ -46,7 +46,7 @@ export class Viewport {
     if (next !== undefined) this.show(next === Infinity ? null : next);
   }
 
-  /** Stand still, or go along with the run again. */
+  /** Freeze, or follow the run again. */
   freeze(on = !this.frozen) {
     if (!on) return this.live();
     this.end_s = this.shown[1];
@@ -62,14 +62,14 @@ export class Viewport {
     this.changed();
   }
 
-  /** Look at the time from ... to ..., s. */
+  /** Show the time from ... to ..., s. */
   at(from_s, to_s) {
     this.span_s = Math.max(LEAST_SPAN_S, to_s - from_s);
     this.end_s = this.within(to_s);
     this.changed();
   }
 
-  /** Go back (negative) or on by a part of what is shown. */
+  /** Go back (negative) or forward by a part of what is shown. */
   shift(part) {
     const [from_s, to_s] = this.shown;
     if (this.span_s === null || (!this.frozen && part > 0)) return;
@@ -81,26 +81,26 @@ export class Viewport {
     return Math.max(Math.min(end_s, this.last_s), Math.min(this.first_s + this.span_s, this.last_s));
   }
 
-  /** Whether the samples of the force are wanted, to be heard. */
+  /** Set whether the samples of the force are wanted, to play them. */
   listen(on) {
     this.sound = on;
     this.changed();
   }
 
-  /** Measure from here, then to here; a third time, no more. */
+  /** Measure from here; when called again, to here; a third time, stop measuring. */
   mark(t_s) {
     this.measured = this.measured.length < 2 ? [...this.measured, t_s] : [];
     this.changed();
   }
 
-  /** What is shown beside the charts over time. */
+  /** Choose what is shown beside the charts over time. */
   choose(panel) {
     if (panel === this.panel) return;
     this.panel = panel;
     this.changed();
   }
 
-  /** As many points as the charts are wide. */
+  /** Ask for as many points as the charts are wide. */
   fit(width_px) {
     const points = Math.min(MOST_POINTS, Math.max(LEAST_POINTS, Math.round(width_px)));
     if (Math.abs(points - this.points) < 50) return;

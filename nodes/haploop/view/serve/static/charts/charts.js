@@ -15,7 +15,7 @@ const CHARTS = {
 const NO_TIMES = new Float64Array(0);
 
 export class Charts {
-  /** @param {import("../viewport.js").Viewport} viewport what is looked at. */
+  /** @param {import("../viewport.js").Viewport} viewport what is shown. */
   constructor(viewport) {
     this.viewport = viewport;
     this.charts = Object.fromEntries(
@@ -56,7 +56,7 @@ export class Charts {
     this.panels.panels.loops.drawAll();
   }
 
-  /** Fit all axes closely the next time: another stretch of time is looked at. */
+  /** Fit all axes closely the next time: another stretch of time is shown. */
   refit() {
     for (const { range } of Object.values(this.charts)) range.forget();
     this.panels.refit();
@@ -69,7 +69,7 @@ function wallOf(lines, { wall }) {
   return face && wall?.into_wall ? { values: face.values, side: Math.sign(wall.into_wall) } : null;
 }
 
-/** The residual, in words where it is worth them: "This plant invents 27 %". */
+/** The residual, in words if it is large enough for that: "This plant invents 27 %". */
 function residual({ residual_J: rest, balance }) {
   if (balance) return balance.split(" of the energy")[0];
   return isNumber(rest) ? `residual ${amount(rest, "J", 2)}` : "";

@@ -76,7 +76,7 @@ export class ComparePanel {
   }
 }
 
-/** What a cause takes out of the device, in watts; below zero it feeds. */
+/** What a cause takes out of the device, in watts; below zero it feeds the device. */
 function power(side, name) {
   const { rows, from_s: from, to_s: to } = side?.budget ?? {};
   const row = rows?.find((one) => one.name === name);

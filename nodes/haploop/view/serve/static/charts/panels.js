@@ -23,7 +23,7 @@ export class Panels {
       motion: new MotionPanel(byId("motion")),
       own: new OwnPanel(byId("own"), viewport),
     };
-    // Bars and tables are read, not watched; of a loop, some pictures a second are enough.
+    // Bars and tables are read, not watched; for a loop, a few pictures per second are enough.
     this.panels.loops.show = beat(LOOPS_MS)(this.panels.loops.show.bind(this.panels.loops));
     for (const panel of [this.panels.energy, this.panels.compare]) panel.show = seldom(panel.show.bind(panel));
     this.tabs = [...document.querySelectorAll("[role=tab]")];

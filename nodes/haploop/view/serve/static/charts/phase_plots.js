@@ -8,7 +8,7 @@ import { dots, line } from "../drawing/paths.js";
 import { scaled } from "../snapshot.js";
 
 const GRAMS = 1e3;
-// The axes of force and penetration never cover less, m and N.
+// The axes of force and penetration never cover less than this, m and N.
 const LEAST = [1e-5, 0.01];
 const DOT_PX = 3;
 const NOW_PX = 7;
@@ -64,7 +64,7 @@ export class PhasePlots {
   }
 }
 
-/** Pressing and releasing told apart, beside the wall it should be; what lies outside the wall is left out, an empty list where all does. */
+/** Pressing and releasing as separate lines, beside the wall as it should be; without what is outside the wall, an empty list if all is. */
 function forceLoop({ columns, stiffness, curve }, [inDepth, inForce]) {
   const [depth, newtons] = columns.map(({ values }) => values);
   const force = scaled(newtons, inForce.factor);

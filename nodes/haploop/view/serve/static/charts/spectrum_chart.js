@@ -59,7 +59,7 @@ export class SpectrumChart {
   show({ tables: { spectrum }, lines, coarse }) {
     for (const chart of this.charts) {
       const { name, side, unit, u } = chart;
-      chart.card.hidden = !spectrum; // axes without a line would tell numbers of nothing
+      chart.card.hidden = !spectrum; // axes without a line would show numbers of nothing
       const column = spectrum?.columns.find((one) => one.name === name);
       const at = spectrum ? times(spectrum) : new Float64Array(0);
       if (unit.serve(Math.max(side.least, extent([column?.values ?? []])[1]))) {
@@ -86,7 +86,7 @@ export class SpectrumChart {
   }
 }
 
-/** Whether a frequency has its number below: 1, 2 and 5 stand apart on a logarithmic axis, 8 and 10 do not. */
+/** Whether a frequency gets a number on the axis: 1, 2 and 5 are far enough apart on a logarithmic axis, 8 and 10 are not. */
 const isTold = (hz) => hz != null && [1, 2, 5].includes(Math.round(hz / 10 ** Math.floor(Math.log10(hz) + 1e-9)));
 
 /** The main line in words. */

@@ -13,21 +13,21 @@ import { between, Marked, readingsAt, told } from "../drawing/readings.js";
 import { newest, scaled, times } from "../snapshot.js";
 
 const CURSORS = "haploop";
-// Where the charts lie one below the other, each has its times: that of the last is out of sight.
+// Where the charts lie one below the other, each has its own times: those of the last chart are out of sight.
 const NARROW = matchMedia("(max-width: 699px)");
-// What the times below take of a chart's height, and a letter beside it.
+// How much of a chart's height the times below it take, and a letter of the name beside it.
 const [TIMES_PX, LETTER_PX] = [46, 6.2];
-// No size is known yet that the axis could take: it has one of its unit.
+// No size for the axis is known yet: it covers one of its unit.
 const WHERE_ALL_IS_ZERO = [-0.5, 0.5];
 const OVERLAY = { key: "overlay", line: { colour: "overlay", width: 1.2 } };
-// From so many pixels on, an interval of which only the extremes are kept is a box: a line would swing as nothing did.
+// From this many pixels on, an interval of which only the extremes are kept is a box: a line would show swings that nothing made.
 const BOX_PX = 4;
 
 export class TimeChart {
   /**
    * @param {HTMLElement} host takes the chart.
    * @param {object} options label, SI unit and first prefix of the left axis; least: it never covers less, in SI; zero:
-   *   it always shows 0; times: whether the times stand below it.
+   *   it always shows 0; times: whether the times are below the chart.
    * @param {import("../viewport.js").Viewport} viewport what dragging in the chart changes.
    */
   constructor(host, options, viewport) {
@@ -121,7 +121,7 @@ export class TimeChart {
    * @param {[number, number]} span first and last time, s.
    * @param {Float64Array} t times of the numbers, s.
    * @param {{key: string, label: string, line: object, values: ArrayLike<number>}[]} lines
-   * @param {object} more isEnvelope: whether each two numbers are the extremes of one interval; wall: {values, side} to
+   * @param {object} more isEnvelope: whether each pair of numbers is the extremes of one interval; wall: {values, side} to
    *   shade, or null; marks; note for the end of the legend; overlay: {table, label, fits} of another run, or null, and
    *   whether the axis has room for it.
    */
@@ -140,7 +140,7 @@ export class TimeChart {
     this.draw();
   }
 
-  /** Whether other numbers want another unit. */
+  /** Take another unit if these numbers need one; whether they did. */
   climb(lines) {
     const [low, high] = extent(lines.map(({ values }) => values));
     const largest = Math.max(Math.abs(low), Math.abs(high));
@@ -181,7 +181,7 @@ export class TimeChart {
     u.ctx.restore();
   }
 
-  /** Whether only the extremes of intervals are known that are some pixels wide. */
+  /** Whether only the extremes of intervals are known, and these intervals are some pixels wide. */
   isCoarse() {
     const [begin, end] = this.span;
     return this.isEnvelope && this.t.length > 1 && (2 * (this.t[1] - this.t[0]) * this.u.bbox.width) / (end - begin) >= BOX_PX * devicePixelRatio;
@@ -205,7 +205,7 @@ export class TimeChart {
     return u.ctx.restore();
   }
 
-  /** What the lines read under the cursor, or at last: all of one time. */
+  /** Show what the lines read under the cursor, or else last: all at one time. */
   tell() {
     if (!this.u) return undefined;
     const { t, lines, isEnvelope, unit: { factor } } = this;
@@ -221,7 +221,7 @@ export class TimeChart {
     return this.isCoarse() ? `only ranges of ${amount(2 * (this.t[1] - this.t[0]), "s")} kept` : "";
   }
 
-  /** Time and differences; of lines of which no single sample is known, between which they lie. */
+  /** Show time and differences; for lines of which no single samples are known, the range of the difference. */
   measure({ time, of }) {
     const texts = this.lines.map(({ key }) => `Δ ${told(of(key), this.unit.factor)}`);
     this.legend.tell(texts, `Δ ${steady(time, 4)} s${time ? `, ${amount(Math.abs(1 / time), "Hz")}` : ""}`);
@@ -237,7 +237,7 @@ export class TimeChart {
     return { width: Math.max(120, this.box.width), height: Math.max(60, this.box.height) };
   }
 
-  /** What stands along the left axis: the unit alone where the chart is too low for more. */
+  /** The name along the left axis: the unit alone where the chart is too low for more. */
   axisName() {
     const name = named(this.options.label, this.unit.name);
     const high = this.size().height - (this.options.times || NARROW.matches ? TIMES_PX : 0);

@@ -37,7 +37,7 @@ export function amounts(low, high, unit) {
   return `${[low, high].map((value) => steady(value / factor, decimals)).join(" to ")} ${letter}${unit}`;
 }
 
-/** What is there of a whole, both in the whole's unit and to its digits: "0.52 of 1.00 MN/m". */
+/** A part of a whole, both in the whole's unit and to its digits: "0.52 of 1.00 MN/m". */
 export function amountOf(part, whole, unit) {
   const [factor, letter] = prefixOf(whole);
   const text = fixed(whole / factor);
@@ -47,7 +47,7 @@ export function amountOf(part, whole, unit) {
 /** A number in powers of ten: "2.1e−16". */
 export const power = (value, digits = 2) => (isNumber(value) ? minus(value.toExponential(digits - 1)) : NONE);
 
-/** A number of a fixed number of decimals, so that it keeps its place while it changes. */
+/** A number with a fixed number of decimals, so that it keeps its place while it changes. */
 export const steady = (value, decimals) =>
   isNumber(value) ? minus(value.toFixed(decimals).replace(/^-(0\.?0*)$/, "$1")) : NONE;
 
@@ -68,10 +68,10 @@ export function axisNumbers(splits, step) {
   return splits.map((value) => (value === 0 ? "0" : power(value, digits).replace("e+", "e")));
 }
 
-/** What stands along an axis: a quantity with its unit, or the one that there is. */
+/** The name along an axis: a quantity with its unit, or only one of the two if the other is missing. */
 export const named = (label, unit) => (label && unit ? `${label} (${unit})` : label || unit || "pure number");
 
-/** Name, version and command of a program that is not haploop's own, as far as it told them. */
+/** Name, version and command of a program that is not haploop's own, as far as they are known. */
 export function programName({ name, version, command }) {
   const named = [name, version].filter(Boolean).join(" ") || "a program without a name";
   return command ? `${named} (${command})` : named;

@@ -32,7 +32,7 @@ function shown(u, marks) {
     .map((mark) => ({ ...mark, x: Math.round(left + ((mark.t_s - min) / (max - min)) * width) + 0.5 }));
 }
 
-/** Has `draw` draw within a chart. */
+/** Lets `draw` draw only within a chart. */
 function within(u, draw) {
   const { left, top, width, height } = u.bbox;
   u.ctx.save();
@@ -58,7 +58,7 @@ export const drawMarks = (u, marks) => within(u, (ctx, ratio) => {
   }
 });
 
-/** Write the names of the marks over all lines, which a veil behind them lets through; one that has no room is left out. */
+/** Write the names of the marks over all lines, which show through a veil behind the names; a name without room is left out. */
 export const nameMarks = (u, marks) => within(u, (ctx, ratio) => {
   const free = Array(LANES).fill(-Infinity);
   ctx.font = `${TEXT_PX * ratio}px ${FONT}`;
@@ -81,7 +81,7 @@ function drawLabel(ctx, text, tone, x, { left, top, width }, free, ratio) {
   ctx.fillText(text, start + GAP_PX * ratio, y + 2 * ratio);
 }
 
-/** Draw the times between which is measured. */
+/** Draw the times between which the charts measure. */
 export function drawMeasured(u, measured) {
   const { left, top, width, height } = u.bbox;
   u.ctx.fillStyle = colour("accent");

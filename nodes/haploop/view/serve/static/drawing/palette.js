@@ -12,7 +12,7 @@ const LINES = {
   total: { colour: "ink", width: 1.2 },
 };
 
-// Kinds have their colours by their place here, in every window; others by their letters.
+// Kinds get their colours by their place here, in every window; other kinds by their letters.
 const KINDS = [
   "damping", "unidirectional-inertia", "bidirectional-inertia", "unidirectional-damping", "passivity-controller",
   "force-bounding", "virtual-coupling", "adaptive-inertia", "force-rate", "passivity-controller-reset",
@@ -58,7 +58,7 @@ function placeOf(kind) {
   return place >= 0 ? place : [...kind].reduce((sum, letter) => (31 * sum + letter.codePointAt(0)) % 997, 7);
 }
 
-/** Calls `again` whenever light and dark change places. */
+/** Calls `again` whenever the page changes between light and dark. */
 export function onSchemeChange(again) {
   dark.addEventListener("change", () => {
     known = new Map();

@@ -1,27 +1,27 @@
-// Paths through the points of a uPlot chart, broken where a number is not there (NaN).
+// Paths through the points of a uPlot chart, broken where a number is missing (NaN).
 
 import { colour } from "./palette.js";
 
-/** From data to canvas pixels; what a path needs, worked out once for all its points. */
+/** From data to canvas pixels: what a path needs, computed once for all its points. */
 function projection(u) {
   const { left, top, width, height } = u.bbox;
   const { x, y } = u.scales;
   return { x0: x.min, kx: width / (x.max - x.min), left, y1: y.max, ky: height / (y.max - y.min), top };
 }
 
-// A line passes its points at so many pixels at most, and goes through every peak of what is steep: what lies straight is
-// drawn at one stroke, since most of a picture's time goes into the bends of its lines.
+// A line passes its points at this many pixels at most, and goes through every steep peak: straight stretches are drawn in
+// one stroke, since most of a picture's time goes into the bends of its lines.
 const NEAR_PX = 0.25;
 
 /**
- * A line through all points, or through those alone that `drawn` is true of: a stretch goes on to the point after it.
+ * A line through all points, or only through those for which `drawn` is true: a stretch continues to the point after it.
  *
  * @param {(i: number) => boolean} [drawn]
  */
 export function line(u, xs, ys, drawn) {
   const { x0, kx, left, y1, ky, top } = projection(u);
   const path = new Path2D();
-  // From the last bend at x, y the line goes on to what is held, as long as its slope is between these two.
+  // From the last bend at x, y the line runs to the point that is held, as long as its slope is between low and high.
   let [pen, x, y, holds, heldX, heldY, low, high] = [false, 0, 0, false, 0, 0, 0, 0];
   const bend = () => {
     if (holds) path.lineTo(heldX, heldY);
@@ -62,19 +62,19 @@ export function line(u, xs, ys, drawn) {
   return path;
 }
 
-// A line that goes up and down more than so many times the chart's height is rough, if it has a point a pixel or so; a
-// fourth of that is enough where it turns every third pixel.
+// A line that goes up and down by more than this many times the chart's height is rough, if it has about a point per pixel;
+// a fourth of that is enough where it turns every third pixel.
 const ROUGH = 50;
 const OFTEN_PX = 3;
 const POINTS_A_PIXEL = 0.6;
-// A strip this thick, in lines, or where strips fill this part of what they cover together, is filled faintly.
+// A strip thicker than this, in line widths, is filled faintly where strips fill more than this part of what all of them cover.
 const THICK = 4;
 const FILLED = 0.5;
 const FAINT = 0.45;
 
 /**
  * A rough line as upright strips: top and bottom of each column of canvas pixels of the chart, NaN where there is none; null
- * where the line is smooth or its points lie apart. A pen that goes to and fro thousands of times takes twenty times as long.
+ * where the line is smooth or its points lie apart. A pen that moves up and down thousands of times takes twenty times as long.
  */
 export function strips(u, xs, ys) {
   const { x0, kx, left, y1, ky, top } = projection(u);
@@ -83,7 +83,7 @@ export function strips(u, xs, ys) {
   const [tops, bottoms] = [new Float32Array(wide).fill(NaN), new Float32Array(wide).fill(NaN)];
   const begin = left - Math.round(left);
   let [at, low, high, y, way, turns, rise] = [NaN, 0, 0, NaN, 0, 0, 0];
-  // A strip goes on to the next one; columns beside the chart are left out, as writing there takes long.
+  // A strip extends to the next one; columns outside the chart are left out, since writing there takes long.
   const fill = (from, to) => {
     for (let x = Math.max(0, from), end = Math.min(wide, to); x < end; x++) {
       tops[x] = low;
@@ -112,12 +112,12 @@ export function strips(u, xs, ys) {
   return way > (isBusy ? ROUGH / 4 : ROUGH) * u.bbox.height ? { tops, bottoms } : null;
 }
 
-// Strips are drawn on a sheet of their own, which is laid on the chart: a rectangle for each takes thrice as long.
+// Strips are drawn on a separate sheet, which is laid on the chart: a rectangle for each takes three times as long.
 const sheet = new OffscreenCanvas(1, 1);
 const paper = sheet.getContext("2d");
 let buffer = new ArrayBuffer(0);
 
-/** Draw strips as wide as a line, and dashed; where they cover the same heights again and again, faintly within edges. */
+/** Draw strips with a line's width and dashes; where they cover the same heights again and again, faintly between edges. */
 export function drawStrips(u, { tops, bottoms }, { colour: name, width, dash = [] }) {
   const pen = Math.max(1, Math.round(width * devicePixelRatio));
   const wide = tops.length;
@@ -165,7 +165,7 @@ function pixelOf(name, alpha) {
   return ((Math.round(255 * alpha) << 24) | (blue << 16) | (green << 8) | red) >>> 0;
 }
 
-/** Each two points, the extremes of an interval, as a box around what lies between them. */
+/** Each pair of points, the extremes of an interval, as a box around what lies between them. */
 export function boxes(u, xs, ys) {
   const { x0, kx, left, y1, ky, top } = projection(u);
   const path = new Path2D();

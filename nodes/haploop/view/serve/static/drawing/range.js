@@ -1,10 +1,10 @@
 // The range of an axis that follows its data without trembling at every snapshot.
 
 const MARGIN = 0.07;
-// Data that fill less than this of the axis draw it closer.
+// Data that fill less than this part of the axis make it fit more closely.
 const FILLED = 0.5;
 
-/** Smallest and largest of some columns and `extra` numbers; NaN counts for nothing. */
+/** Smallest and largest of some columns and `extra` numbers; NaN is ignored. */
 export function extent(columns, extra = []) {
   let low = Infinity;
   let high = -Infinity;

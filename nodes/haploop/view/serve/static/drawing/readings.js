@@ -4,7 +4,7 @@ import { NONE, steady } from "./amounts.js";
 
 const DECIMALS = 3;
 
-/** The least and the greatest of what a row stands for: of an envelope each two rows are the extremes of one interval. */
+/** The least and the greatest of what a row stands for: in an envelope each pair of rows is the extremes of one interval. */
 function reading(values, row, isEnvelope) {
   const [one, other] = isEnvelope ? [values[row - (row % 2)], values[row - (row % 2) + 1]] : [values[row], values[row]];
   return one < other ? [one, other] : [other, one];
@@ -17,7 +17,7 @@ export const readingsAt = (t, lines, row, isEnvelope) => ({
   values: new Map(lines.map(({ key, values }) => [key, reading(values, row, isEnvelope)])),
 });
 
-/** A reading in another unit as text: one number where its ends are told alike, else both to the digits that count. */
+/** A reading in another unit as text: one number where its ends read the same, else both, to the digits that count. */
 export function told([low, high], factor) {
   const [from, to] = [low, high].map((end) => steady(end * factor, DECIMALS));
   if (from === to || from === NONE || to === NONE) return to;
@@ -27,7 +27,7 @@ export function told([low, high], factor) {
 
 const UNKNOWN = [NaN, NaN];
 
-/** What there is between two readings of all lines: the time, and by how much a line may be higher at the second. */
+/** The difference between two readings of all lines: the time, and by how much a line may be higher at the second. */
 export const between = (one, other) => ({
   time: other.t - one.t,
   of: (key) => {
@@ -36,13 +36,13 @@ export const between = (one, other) => ({
   },
 });
 
-/** The readings at the times between which is measured; they stay when the times are moved out of sight. */
+/** The readings at the times between which the charts measure; they stay when these times are moved out of sight. */
 export class Marked {
   constructor() {
     this.known = new Map();
   }
 
-  /** Read what is in sight of these times, and return what is known; a reading of single samples is not given up. */
+  /** Read the lines at those of these times that are in sight, and return what is known; a reading of single samples is kept. */
   look(marks, t, lines, isEnvelope, rowOf) {
     for (const mark of [...this.known.keys()]) if (!marks.includes(mark)) this.known.delete(mark);
     for (const mark of marks) {

@@ -7,7 +7,7 @@ import { make, put } from "../dom.js";
 const SHOWN_AS = { m: ["mm", 1e3], s: ["ms", 1e3] };
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,3})?$/i;
 const WITH_UNIT = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,3})?\s*[^\d\s.,+-].*$/i;
-// An old number that comes after an order was taken is not shown for so long.
+// How long an old number that comes after an order was accepted is not shown.
 const HELD_MS = 2000;
 const BOUNDS = [
   ["at_least", "at least", "≥", (value, bound) => value >= bound],
@@ -50,7 +50,7 @@ export class Field {
       .join(", ");
   }
 
-  /** The number as it is now, in SI; shown unless something else is being typed. */
+  /** Take the present number, in SI; it is shown unless something else is being typed. */
   show(value) {
     if (performance.now() < this.heldUntil && value === this.before) return;
     const wasTouched = this.touched;
@@ -60,19 +60,19 @@ export class Field {
     if (!wasTouched && this.input.value !== this.present) this.input.value = this.present;
   }
 
-  /** Whether something else stands in the field than the number as it is. */
+  /** Whether the field holds something else than the present number. */
   get touched() {
     return this.input.value.trim() !== this.present;
   }
 
-  /** What was typed was taken: it stays until the run tells so too, in its own words. */
+  /** What was typed was accepted: it stays until the run reports it, too, in its own words. */
   settle() {
     this.heldUntil = performance.now() + HELD_MS;
     this.present = this.input.value = this.text;
     this.complain("");
   }
 
-  /** Back to the number as it is. */
+  /** Go back to the present number. */
   reset() {
     this.input.value = this.present;
     this.complain("");
@@ -82,7 +82,7 @@ export class Field {
     return this.input.value.trim().replaceAll("−", "-");
   }
 
-  /** Why what stands in the field cannot be used; "" when it can, as far as the page knows. */
+  /** Why the content of the field cannot be used; "" when it can, as far as the page knows. */
   complaint() {
     const { text, unit } = this;
     if (this.choices) return "";
@@ -107,7 +107,7 @@ export class Field {
     else this.input.removeAttribute("aria-invalid");
   }
 
-  /** As the run takes it: a number in SI, or text with its unit, which the run converts exactly. */
+  /** The content as the run takes it: a number in SI, or text with its unit, which the run converts exactly. */
   value() {
     if (this.choices) return JSON.parse(this.text);
     if (!NUMBER.test(this.text)) return this.text;
@@ -115,7 +115,7 @@ export class Field {
   }
 }
 
-/** Complain where needed; the first field that cannot be used, focused, or undefined. */
+/** Complain where needed; returns the first field that cannot be used, focused, or undefined. */
 export function firstWrong(fields) {
   for (const field of fields) field.complain(field.complaint());
   const wrong = fields.find((field) => field.complaint());

@@ -25,7 +25,7 @@ export class Slider {
     field.element.append(this.input, this.why);
   }
 
-  /** The number as it is, and the limit it has, in SI, or why none is known; no slider for a number that is not above zero. */
+  /** Show the present number and its limit, in SI, or why none is known; no slider for a number that is not above zero. */
   show(value, limit = null, why = "") {
     put(this.why, limit ? "shaded: unstable, but for friction, quantisation and noise" : why ? `no limit is shaded: ${why}` : "");
     this.input.hidden = !(value > 0);

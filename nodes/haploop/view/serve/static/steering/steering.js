@@ -14,7 +14,7 @@ const REASONS = {
 /** Why nothing can be steered now; "" when it can. */
 export const obstacle = (phase) => REASONS[phase] ?? (maySteer() ? "" : WATCHING);
 
-/** Enable or disable all that steers, and say why; whether the page stays with a run that has ended. */
+/** Enable or disable all that steers, and say why; `stays`: whether the page stays with a run that has ended. */
 export function allow(phase, why, stays = false) {
   const reason = obstacle(phase);
   for (const fieldset of document.querySelectorAll("fieldset[data-steers]")) fieldset.disabled = reason !== "";
@@ -28,7 +28,7 @@ export class Steering {
     this.stream = stream;
   }
 
-  /** Give an order; the answer {ok, text}, also told on the page unless `quiet` and refused. */
+  /** Give an order; returns the answer {ok, text}, which is also shown on the page unless `quiet` and refused. */
   async order(verb, args = {}, { quiet = false } = {}) {
     const answer = await this.stream.command(verb, args);
     if (answer.ok || !quiet) say(answer);
@@ -37,12 +37,12 @@ export class Steering {
   }
 }
 
-/** Tell what came of an order. */
+/** Show the result of an order. */
 export function say({ ok, text, what = "Refused" }) {
   const said = byId("said");
   said.dataset.ok = String(ok);
   said.setAttribute("role", ok ? "status" : "alert");
-  // There is a button for what a terminal is told to do to go back.
+  // The page has a button for what the text says about going back in a terminal.
   const told = text.replace(/; to go back: .*$/m, "").replace(/([^.])\n/g, "$1. ");
   put(said, ok ? told : `${what}: ${text}`);
 }

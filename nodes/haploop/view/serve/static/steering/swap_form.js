@@ -4,7 +4,7 @@ import { byId, make, put } from "../dom.js";
 import { Field, firstWrong, refuse } from "./field.js";
 
 const REMOVE = "none";
-// After a swap the next one waits so long, or until the form has been changed.
+// After a swap the next one waits this long, or until the form has been changed.
 const LOCKED_MS = 700;
 
 export class SwapForm {
@@ -43,7 +43,7 @@ export class SwapForm {
     choices("swap-element", [...names, [String(this.elements.length), `${this.elements.length}: add one`]]);
     this.offerKinds();
     if (isFirst) {
-      // What was chosen for another run stays no longer.
+      // What was chosen for another run does not stay.
       for (const id of ["swap-element", "swap-kind", "swap-acts"]) byId(id).selectedIndex = 0;
       this.takeElement();
     }
@@ -92,7 +92,7 @@ export class SwapForm {
     this.isBegun = this.isKindChosen = false;
   }
 
-  /** One order at a time: three clicks are one swap, however long they take one after the other. */
+  /** One order at a time: three clicks are one swap, however slowly they follow one another. */
   async swap() {
     if (byId("swap-do").disabled) return;
     put(byId("swap-problem"), "");

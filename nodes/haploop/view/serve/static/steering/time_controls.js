@@ -36,7 +36,7 @@ export class TimeControls {
     return this.steering.order("step", { ticks });
   }
 
-  /** Go on at "free" or so many simulated seconds a second; what is refused stays as it was. */
+  /** Continue at "free" or at this many simulated seconds per second; after a refusal the choice goes back to what it was. */
   async pace(value) {
     const answer = await this.steering.order("pace", { pace: value === "free" ? value : Number(value) });
     if (!answer.ok) this.update(this.state);

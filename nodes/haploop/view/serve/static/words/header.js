@@ -1,24 +1,24 @@
-// The answer at once: the verdict, the state of the run and the numbers that tell how it goes.
+// The answer at a glance: the verdict, the state of the run and the numbers that tell how it goes.
 
 import { amount, amountOf, fixed, isNumber, NONE, plain, power, steady } from "../drawing/amounts.js";
 import { byId, put, sign } from "../dom.js";
 
 const WORDS = { lost: "not connected" };
 const VERDICTS = new Set(["steady", "limit-cycle", "growing", "diverged", "no-contact", "undecided"]);
-// What is seen in the last half second says nothing of stability: that is judged when the run has ended. Its signs:
+// What is seen in the last half second says nothing about stability: that is judged when the run has ended. Its signs:
 const SIGNS = {
   swinging: "limit-cycle", growing: "growing", "force ripples": "limit-cycle", "no contact": "no-contact",
   "not finite": "diverged",
 };
-/** Words of what swings. */
+/** Words for swings. */
 export const SWINGS = new Set(["swinging", "growing", "dying away"]);
 const NOT_YET = { awaited: "being judged", unknown: "not known" };
 
-/** What there is of a verdict, in a word. */
+/** The state of the verdict, in a word. */
 export const told = ({ verdict, verdict_is: is, sight, phase }) =>
   isJudged({ verdict, verdict_is: is }) ? verdict : (NOT_YET[is] ?? (sight?.so_far && phase === "ended" ? "too short" : sight?.word));
 
-/** Whether there is a word that more than what was seen stands behind. */
+/** Whether there is a word that rests on more than what was seen. */
 export const isJudged = ({ verdict, verdict_is: is }) => is === "judged" || verdict === "diverged";
 
 /** Show a state; `phase` is its phase, or "lost" without a connection. */
@@ -44,7 +44,7 @@ export function showHeader(state, phase) {
   showTime(state);
 }
 
-/** At how many hertz it swings; of what has stopped in the last half second, none. */
+/** The frequency of the swing; none if that has stopped in the last half second. */
 export const frequency = ({ oscillation_m: width, force_swing_N: force, frequency_Hz: hz }) => (width || force ? amount(hz, "Hz") : NONE);
 
 function showVerdict(state) {
@@ -62,7 +62,7 @@ function showVerdict(state) {
   sign(sought, `verdict-${still && known === "steady" ? "limit-cycle" : known}`, told(state) || "no verdict");
 }
 
-/** What the picture shows still where a loop is judged steady, or not to be judged. */
+/** What the picture still shows where a loop is judged steady, or cannot be judged. */
 function moved({ verdict, sight }) {
   if (!["steady", "undecided"].includes(verdict) || !sight) return "";
   const { oscillation_m: width, ripple_N: ripple, rests } = sight;
@@ -74,7 +74,7 @@ function moved({ verdict, sight }) {
   return word in SIGNS ? `last seen: ${word}` : "";
 }
 
-/** Of when a word is: of how much of the half second that it takes, or of which. */
+/** The time to which a word refers: how much of the half second that it needs has passed, or from when to when. */
 function seen(sight) {
   if (!sight) return "";
   const { from_s: from, to_s: to, so_far: soFar } = sight;
@@ -82,7 +82,7 @@ function seen(sight) {
 }
 
 function stiffness({ displayed_stiffness_N_m: displayed, wall, sight }) {
-  if (SWINGS.has(sight?.word)) return NONE; // force over depth of a swing is none
+  if (SWINGS.has(sight?.word)) return NONE; // force over depth of a swing is no stiffness
   const isSpring = isNumber(displayed) && wall?.into_wall && !wall.kind;
   return isSpring ? amountOf(displayed, wall.stiffness, "N/m") : amount(displayed, "N/m");
 }

@@ -1,4 +1,4 @@
-// The runs there are: live ones and those that were recorded. One is on show, another may be drawn behind it.
+// The runs, live ones and those that were recorded. One is on show, another may be drawn behind it.
 
 import { plain } from "../drawing/amounts.js";
 import { byId, make, put } from "../dom.js";
@@ -8,8 +8,8 @@ const WATCHING = "Watching only: who has the link that haploop view printed choo
 
 export class RunChoice {
   /**
-   * @param {import("../steering/steering.js").Steering} steering carries the choice: it is that of all pages of this viewer.
-   * @param {import("../viewport.js").Viewport} viewport what is looked at.
+   * @param {import("../steering/steering.js").Steering} steering carries the choice, which holds for all pages of this viewer.
+   * @param {import("../viewport.js").Viewport} viewport what is shown.
    */
   constructor(steering, viewport) {
     this.viewport = viewport;
@@ -29,7 +29,7 @@ export class RunChoice {
   update(listing) {
     this.listing = listing;
     const { live, past, shown, title } = listing;
-    // One that has ended stays on show, though nobody can open it again by this name.
+    // A run that has ended stays on show, though nobody can open it again by this name.
     const over = shown && ![...live, ...past].some(({ id }) => id === shown) ? [{ id: shown, title: title ?? shown, told: "ended" }] : [];
     const known = JSON.stringify([live, past, over]);
     if (known !== this.known) {
@@ -42,14 +42,14 @@ export class RunChoice {
     this.mark();
   }
 
-  /** The run that is drawn over the one on show: its name, what came of it, and whether its numbers leave room for others. */
+  /** The run that is drawn over the one on show: its name, its result, and whether its numbers leave room for others. */
   behind() {
     const { overlay, past = [], overlay_diverged: diverged } = this.listing ?? {};
     const { title = overlay, told } = past.find(({ id }) => id === overlay) ?? {};
     return { label: `over: ${title}`, fits: !diverged, told };
   }
 
-  /** Tell why nothing of the run drawn over is seen, where all that is shown comes after its end. */
+  /** Say why nothing of the run drawn over is seen, if everything shown comes after its end. */
   tellUnseen() {
     const { overlay_end_s: end } = this.listing ?? {};
     const isSeen = end == null || end > this.viewport.shown[0];
@@ -77,12 +77,12 @@ export class RunChoice {
   }
 }
 
-/** What tells runs apart comes first, of a folder named by its time the time of day: what follows may be cut off. */
+/** What tells runs apart comes first, for a folder named by its time the time of day: the rest may be cut off. */
 const option = (run) => make("option", { value: run.id, title: words(run) }, words(run, run.id.replace(/^(.*)-\d{8}-(\d{6}.*)$/, "…$2 $1")));
 
 const words = ({ id, title, told }, name = id) => [title === id ? name : `${name}: ${title}`, told].filter(Boolean).join(", ");
 
 const group = (label, runs) => make("optgroup", { label }, ...runs.map(option));
 
-/** Shown where no run is. */
+/** Shown while there is no run. */
 const none = () => make("option", { value: "", hidden: "" }, "none on show");

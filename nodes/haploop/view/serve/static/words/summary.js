@@ -1,4 +1,4 @@
-// What came of a run that has ended: the figures and books of its summary.json.
+// The result of a run that has ended: the figures and books of its summary.json.
 
 import { amount, amounts, fixed, isNumber, NONE, programName } from "../drawing/amounts.js";
 import { byId, make } from "../dom.js";
@@ -32,7 +32,7 @@ export function showSummary(state) {
   );
 }
 
-/** What the loop did, held still and pushed; nothing where it was not watched to an answer. */
+/** What the loop did when it was held still and pushed; nothing if it was not watched until there was an answer. */
 function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
   if (!isNumber(rate)) return {};
   const how = [found.frequency_Hz && `at ${amount(found.frequency_Hz, "Hz")}`, found.felt ? "felt" : "not felt"];
@@ -58,10 +58,10 @@ function figures({ duration_s, ended, extremes = {}, window = {}, real_time_fact
   return {
     ran: `${isNumber(duration_s) ? fixed(duration_s, 4) : NONE} s, ${HOW[ended] ?? ended}`,
     "position from": amounts(extremes.x_min_m, extremes.x_max_m, "m"),
-    // As the summary has them: the position with its trend, the force of the command; above the charts they are others.
+    // As the summary has them: the position with its trend, the force of the command; the figures above the charts differ.
     ...(isNumber(window.oscillation_m) ? { [`oscillation, ${last}`]: `${amount(window.oscillation_m, "m")} p-p` } : {}),
     ...(isNumber(window.force_swing_N) ? { "commanded force": `${amount(window.force_swing_N, "N")} p-p` } : {}),
-    // That of the run itself: noise and the hand, which the pushed copies have not, are in it.
+    // The ripple of the run itself: it includes noise and the hand, which the pushed copies do not have.
     ...(isNumber(window.force_ripple_N) ? { "its own ripple": `${amount(window.force_ripple_N, "N")} above 30 Hz` } : {}),
     "largest force": amount(extremes.force_max_N, "N"),
     "real time": isNumber(factor) ? `${fixed(factor)}×${wasPaused ? ", its pauses in it" : ""}` : NONE,
@@ -80,7 +80,7 @@ function rows(texts) {
   return make("dl", { class: "rows" }, ...entries);
 }
 
-/** Every book with what it took by its own account (sampled) and in truth. */
+/** Every book with what it took as sampled and in truth. */
 function books({ wall = {}, elements = [], moved_J: moved, residual_J: residual, unmodelled_work_J: unmodelled }) {
   const head = ["book", "sampled", "true"].map((text) => make("th", { scope: "col" }, text));
   const rows = [["wall", wall.sampled_J, wall.true_J]];
