@@ -132,7 +132,7 @@ class ControllerBuffer:
         return Commanded(self.first, self.columns["x"], {"wall": self.columns["wall"]} | forces, wall)
 
     def forget_before(self, tick: int, command: int) -> None:
-        """Drops rows older than ``tick - 1`` and ``command``, the one in effect then, and books with no force left.
+        """Drops rows older than both ``tick - 1`` and ``command``, in effect then, and books with no force left.
 
         A book that opens at ``tick`` or later stays even without a force, so that it opens at its own tick.
         """

@@ -16,8 +16,7 @@ from haploop.protocol.ticks import Timebase
 class ClosingBooks:
     """The books of the device alone; ``names`` are in the order in which ``increments`` yields them.
 
-    Only the rows of telemetry are known, not what acts between them. Over a plant step h from v to v+ with
-    displacement dx,
+    Only the rows of telemetry are known, not what acts between them. Over a plant step h from v to v+, displaced by dx:
     heat of the damper   b h ((v^2 + v v+ + v+^2) / 3 + c (v + v+) / 6 + c^2 / 30),  c = 6 dx / h - 3 (v + v+),
     exact where the velocity is a parabola in time, as it nearly is over a step of any smooth motion.
     """

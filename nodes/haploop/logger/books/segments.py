@@ -136,7 +136,7 @@ def _in_order(steps: int, step_of_piece: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _elapsed(step: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Returns the fraction of its step that has passed when each segment begins: exact, wherever a block begins."""
+    """Returns what fraction of its step has passed at each segment's start: exact, the same wherever a block begins."""
     lasts = np.uint64(1) << (_FINEST - level).astype(np.uint64)
     over = np.cumsum(lasts) - lasts
     first = np.searchsorted(step, step)

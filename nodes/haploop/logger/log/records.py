@@ -71,7 +71,7 @@ def frame(opcode: int, length: int) -> bytes:
 
 
 def demand_index(content: bytes) -> None:
-    """Raises ValueError if this is no index of messages: a chunk with a flipped bit before it may pass for one."""
+    """Raises ValueError if this is no index of messages: a chunk with a flipped bit in its opcode may pass for one."""
     head = 6
     if len(content) != head + int.from_bytes(content[2:head], "little"):
         raise ValueError("an index of messages is longer or shorter than it says")

@@ -123,7 +123,7 @@ def _energy(history: History) -> Planned:
 
 
 def _books_at_work(history: History, books: list[str]) -> dict[str, str]:
-    """Returns the newest books of each kind, as many as elements of the kind are at work, with place and kind of these.
+    """Returns the newest books of each kind, as many as its elements at work, each with the element's place and kind.
 
     The other books are closed.
     """

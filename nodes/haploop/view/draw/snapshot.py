@@ -44,7 +44,7 @@ def snapshot(
     Tables over time are position, force and energy; each row by row where the page has room for it, else as an envelope
     whose rows are the two extremes of consecutive buckets, rising or falling as the data do. Position and total force
     of ``overlay``, another run, come with them. With ``beside`` there is also an overview of the whole run, and what
-    the page's panel asks for, which includes ``changes``. A table without data is left out. ``coarse`` in the header
+    the page's panel asks for, to which ``changes`` belong. A table without data is left out. ``coarse`` in the header
     tells whether the interval begins before what is held in full. The interval of a run that has ended does not reach
     beyond its end, except for what ``overlay`` has there.
     """

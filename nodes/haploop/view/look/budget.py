@@ -57,7 +57,7 @@ def _at(series: Any, names: Sequence[str], tick: int) -> tuple[np.ndarray, int]:
 
 
 def _causes(names: Sequence[str], labels: Mapping[str, str]) -> Iterator[tuple[str, list[tuple[float, str]]]]:
-    """Yields each cause with the books that make it up, and their signs; ``labels`` rename books, by book."""
+    """Yields each cause with its books and their signs; ``labels``, by book, are for those not shown by their name."""
     for name in names:
         if name.endswith("_work"):
             yield labels.get(name, name.removesuffix("_work")), [(-1.0, name)]

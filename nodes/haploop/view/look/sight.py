@@ -1,4 +1,4 @@
-"""Sight of a loop: what its newest half second and two seconds show, and a word, given only for one regime."""
+"""Sight of a loop: what its newest half second and two seconds show, in a word only for a window in one regime."""
 
 from __future__ import annotations
 
