@@ -130,7 +130,7 @@ class RunSession:
         self.read_summary()
 
     def end_without_launcher(self) -> None:
-        """Ends the session of a launcher that has gone: in order, its last messages perhaps lost, or by being killed."""
+        """Ends the session after its launcher has gone: in order, its last messages perhaps lost, or because killed."""
         self.poll()
         if not self.outcome:
             self.end("ended", "")
