@@ -46,7 +46,7 @@ class Checkpoint(NamedTuple):
 class Plant:
     """Sampling, commands and record of one plant; knows nothing of sockets.
 
-    ``stop_reason`` says why the plant ended by itself (diverged), or is None.
+    ``stop_reason`` says why the plant ended by itself (it diverged, or a command was not finite), or is None.
     """
 
     def __init__(self, scene: Scene, time: Timebase) -> None:

@@ -127,6 +127,7 @@ def run(
         RunFailed: a process was killed, hung or could not go on, or an element raised.
         LogError: the log could not be written.
         TypeError: ``out`` is not a path.
+        ValueError: a finite pace was given without ``processes``.
     """
     if out is not None and not isinstance(out, str | Path):
         raise TypeError(

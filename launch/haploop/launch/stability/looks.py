@@ -57,8 +57,8 @@ def push_of(hold_N: float, hand: Hand | None, wall_m: float) -> float:
 def is_struck(found: Finding) -> bool:
     """Tells whether a loop is also struck, since a loop that rests after a push may swing on after a blow.
 
-    Friction holds a small swing; a saturating actuator gives way to a wide one, as a switching element does, and off
-    the wall there is none of it.
+    Friction holds a small swing; a saturating actuator gives way to a wide one, as a switching element does, and an
+    element that acts in contact does nothing off the wall.
     """
     return found.word == "steady" and found.why != "decays"
 

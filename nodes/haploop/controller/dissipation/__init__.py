@@ -1,4 +1,4 @@
-"""Dissipation elements: one per file, all of the same form."""
+"""Dissipation elements: one per file, or one family, all of the same form."""
 
 from haploop.controller.dissipation.element import Element, ElementError, Motion
 from haploop.controller.dissipation.registry import PluginError, load_plugin, registry

@@ -15,7 +15,7 @@ from haploop.plant.where_it_pays import WhereItPays
 from haploop.protocol.trees import tree_select
 
 Columns = dict[str, np.ndarray]
-# Those of a batch; with friction ``pieces``, a list of (place of a member, columns of its pieces), stands beside them.
+# Those of a batch; with friction also ``pieces``: (places of members, their numbers of pieces, columns of all pieces).
 BatchColumns = dict[str, Any]
 # (forms of all products, shape (products, rates, rates); form of the lag integral, shape (rates,)) by kind.
 Made = dict[int, tuple[np.ndarray, np.ndarray]]

@@ -135,8 +135,9 @@ def solve_step(
     """Solves plant step number ``step`` in which body 0 may stick and slip, under a command and a load, N.
 
     A piece of the step is moved by the exact transition. If the mode no longer holds at its end, or may have ceased
-    within it, the piece is halved, until the switch lies within h / 2^32; there the mode changes, and v is set to
-    exactly 0.0. The kinetic energy that this removes, of the order of 1e-20 of what moves, is heat of friction.
+    within it, the piece is halved, until the switch lies within 2^-32 of the coarsest piece; there the mode changes,
+    and v is set to exactly 0.0. The kinetic energy that this removes, of the order of 1e-20 of what moves, is heat of
+    friction.
     A search for a switch ends with one: if at its end the pieces say that the mode still holds, and the one long piece
     said that it does not, the two differ by rounding, and v, or the force that friction could still hold, is no more
     than that. (With a Stribeck velocity long pieces have larger errors: a slip then continues.) A slip that ``creeps``

@@ -19,7 +19,7 @@ class DelayLine:
     """Line with a round-trip delay of d = L n + r steps: command k acts from step k n + d on.
 
     In interval k command k - L - 1 still holds for the first r steps and command k - L for the rest; before the first
-    command the force is 0. Commands are kept no longer than they are in flight.
+    command the force is 0. Commands that are no longer in flight are dropped, some 64 at a time.
 
     Attributes:
         lookahead: L.
