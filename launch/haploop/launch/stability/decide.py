@@ -37,7 +37,8 @@ def decide(swing: Swing, *, last: bool) -> Finding:
 
     *steady*: the swing has died; or it dies or lasts, and no hand feels what is left of it; or at the last look both
     swings still decay alike, to a third within 100 s. *limit-cycle*: the swing forgets how hard it was pushed, yet
-    remains, or it lasts, felt or not. *growing*: both swings grow. Nothing is said about swings of fewer than six periods.
+    remains, or it lasts, felt or not. *growing*: both swings grow. Nothing is said about swings of fewer than six
+    periods.
     """
     if not swing.inside:
         why = "rests off the wall" if swing.moved_m < REST_M else "leaves the wall"
