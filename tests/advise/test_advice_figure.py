@@ -35,7 +35,7 @@ def test_what_withstood_the_attack_stands_beside_what_holds_in_every_corner_and_
 
 
 def test_the_panel_of_changes_says_that_the_element_is_tuned_anew_and_which_column_is_without_one(panels):
-    assert panels[1].get_title(loc="left").endswith("in the hardest corners, the element tuned anew")
+    assert panels[1].get_title(loc="left").endswith("in the hardest corners, with the element tuned again")
     assert beside(panels[1], -0.85)[1:] == ["element", "without"]
 
 
@@ -61,7 +61,7 @@ def test_both_panels_have_one_axis_from_and_to_round_numbers_and_no_bar_whose_le
 def test_every_kind_of_mark_is_in_a_legend(panels):
     walls, changes = ([text.get_text() for text in ax.get_legend().get_texts()] for ax in panels)
     assert walls == ["as described", "in every corner", "attacked", "formula", "published"]
-    assert set(changes) == {"stiffer", "softer", "as stiff within a tenth", "as it is"}
+    assert set(changes) == {"stiffer", "softer", "equally stiff within a tenth", "unchanged"}
 
 
 def test_an_element_fell_only_where_a_wall_that_it_bears_in_every_corner_broke():

@@ -174,7 +174,7 @@ def test_a_directory_with_an_advice_on_another_scene_is_left_as_it_is(tmp_path):
     (tmp_path / "advice.json").write_text("{}")
     done = CliRunner().invoke(app, ["advise", "touch", "--out", str(tmp_path)])
     assert done.exit_code == 2
-    assert f"{tmp_path} holds an advice on another scene" in done.output
+    assert f"{tmp_path} contains advice on another scene" in done.output
     assert (tmp_path / "advice.json").read_text() == "{}"
 
 
@@ -183,9 +183,9 @@ def test_a_directory_with_an_advice_on_another_scene_is_left_as_it_is(tmp_path):
     [
         (
             33_700.0,
-            "Were it right: about 34 N/mm with 12 N s/m of damping, not attacked. Measure friction.kinetic first",
+            "If it were right: about 34 N/mm with 12 N s/m of damping, not attacked. Measure friction.kinetic first",
         ),
-        (17_500.0, "Were it right, the wall would be as stiff within a tenth."),
+        (17_500.0, "If it were right, the wall would be equally stiff within a tenth."),
     ],
 )
 def test_what_is_assumed_stands_in_the_answer_with_what_the_wall_would_be_were_it_right(right_N_m, words):
@@ -196,5 +196,5 @@ def test_what_is_assumed_stands_in_the_answer_with_what_the_wall_would_be_were_i
         found=SimpleNamespace(stiffness_N_m=17_000.0),
     )  # fmt: skip
     found = assumes(told, right)
-    lead = "friction.kinetic, neither measured nor published: the wall bears half and twice of it. "
+    lead = "friction.kinetic, neither measured nor published: the wall withstands it at half and at twice its value. "
     assert found.startswith(lead + words)

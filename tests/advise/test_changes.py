@@ -112,8 +112,8 @@ def changed(factor: float, alone_factor: float) -> Changed:
 
 def test_what_gains_without_the_element_alone_is_told_as_that_and_no_change_is_said_to_gain_with_it() -> None:
     told = told_with(changed(1.1, 1.5))
-    assert told["gains most"] == "no single change that was tried gains a fifth, the element tuned anew"
-    assert told["without one"] == "the wall without an element gains by more: delay halved: 1.5 times"
+    assert told["gains most"] == "no single change that was tried gains a fifth, with the element tuned again"
+    assert told["without one"] == "the wall without an element gains from more changes: delay halved: 1.5 times"
     assert "without one" not in told_with(changed(1.1, 1.1))
     assert told_with(changed(1.3, 1.5))["gains most"] == "delay halved: 1.3 times (1.5 without an element)"
     assert told_with(changed(1.5, 1.5), ())["gains most"] == "delay halved: 1.5 times"
@@ -122,9 +122,9 @@ def test_what_gains_without_the_element_alone_is_told_as_that_and_no_change_is_s
 def test_what_the_verdict_says_beside_its_word_has_a_line_of_its_own() -> None:
     told = told_with(changed(1.0, 1.0))
     assert told["safe up to"].endswith("swinging by less than a hand feels")
-    assert told["its run"].endswith("says beside its verdict: only friction holds it")
+    assert told["its run"].endswith("beside its verdict: only friction holds it")
     both = describe_run(("only friction holds it", "at some holds of its hand", "its force ripples"))
-    assert "only friction holds it, its force ripples; the pushes of that verdict are at some holds" in both
+    assert "only friction holds it, its force ripples; that run is pushed at only some holds" in both
     assert both.endswith("the safe wall was tried at all of them")
 
 
@@ -146,7 +146,7 @@ def test_a_factor_within_what_both_limits_are_known_to_is_told_as_no_change() ->
         some = Changed.from_borne("delay halved", Borne(Limit(stiffness_N_m, fails_N_m), base.alone), base)
         told: Any = SimpleNamespace(
             found=found_with(DAMPING, (5.0,), 2000.0, 1000.0),
-            changed=(some,), without=(), unchanged=Changed.from_borne("as it is", base, base),
+            changed=(some,), without=(), unchanged=Changed.from_borne("unchanged", base, base),
         )  # fmt: skip
         return row(shown(changes_table(told)), "delay halved")
 
@@ -182,7 +182,7 @@ def test_the_stages_of_an_advice_are_told_by_their_place_among_all() -> None:
 def test_a_frequency_is_told_of_a_line_alone_and_both_senses_where_both_feel_it() -> None:
     spikes = Failure("hold x 1", 1.0, False, 22e-6, 0.7, 12.0, 2.0, True, None, 0.5, False, 6, 0.25)
     assert describe(spikes) == (
-        "700 mN and 22 µm peak to peak at no one frequency, turning 6 times in 0.25 s, felt as force; hold x 1"
+        "700 mN and 22 µm peak to peak at no single frequency, turning 6 times in 0.25 s, felt as force; hold x 1"
     )
     wide = Failure("hold x 1", 1.0, False, 5.4e-3, 11.0, 30.0, 200.0, True, None, 90.0, True, 15, 0.25)
     assert "at 30 Hz, felt as force and as motion; " in describe(wide)

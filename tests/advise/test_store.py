@@ -61,7 +61,7 @@ def test_a_full_disk_is_told_in_a_sentence_and_what_was_kept_stays(tmp_path):
     before, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20, before[1]))
     try:
-        with pytest.raises(OutputError, match=r"walls.jsonl, where .* cannot be used: File too large. Make room"):
+        with pytest.raises(OutputError, match=r"walls.jsonl, which keeps .* cannot be used: File too large. Make room"):
             kept.add({"b": None, "c": None}, JOBS)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)

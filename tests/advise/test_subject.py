@@ -41,7 +41,9 @@ def test_a_preset_gets_a_hand_and_says_so():
     assert asked.scene.clock.round_trip_delay == 0.001
 
 
-@pytest.mark.parametrize(("overrides", "words"), [(["hand.mass=0.05"], ", but for hand.mass as set;"), ([], "2012);")])
+@pytest.mark.parametrize(
+    ("overrides", "words"), [(["hand.mass=0.05"], ", except for hand.mass as set;"), ([], "2012);")]
+)
 def test_a_hand_taken_with_other_numbers_is_said_to_have_them(overrides, words):
     assert words in make_subject("touch", None, "1 ms", None, overrides, KINDS).notes[0]
 
@@ -148,9 +150,9 @@ def test_a_number_that_the_command_gives_is_not_assumed_any_more(delay, override
 def test_an_element_that_is_none_of_those_tried_is_named_with_what_tries_it() -> None:
     own = {**KINDS, "mine": KINDS["damping"]}
     [*_, note] = make_subject("touch", None, None, None, [], own).notes
-    assert note.startswith("The element mine is not among what is tried")
-    assert "a sweep over its parameter" in note
-    assert not any("not among" in each for each in make_subject("touch", None, None, None, [], KINDS).notes)
+    assert note.startswith("The element mine is not tried here")
+    assert "A sweep over a parameter" in note
+    assert not any("not tried here" in each for each in make_subject("touch", None, None, None, [], KINDS).notes)
 
 
 def test_a_directory_does_not_hide_the_device_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

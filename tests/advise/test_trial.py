@@ -130,7 +130,7 @@ def test_a_wall_that_throws_the_device_off_for_good_cannot_be_told_and_is_not_bo
     with Trial(Store()) as trial:
         [failure] = trial.failures(thrown, [Tried(1e5)], [Case(0.3)])
     assert failure
-    assert describe(failure) == "cannot be told: in no case is the device still at the wall after 0.75 s"
+    assert describe(failure) == "cannot be judged: in no case is the device still at the wall after 0.75 s"
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.15])

@@ -29,34 +29,37 @@ from haploop.tools.render.units import spring
 AdviceData = dict[str, Any]
 UPPER_BOUND = (
     "Upper bound, not advice: {name} is taken as rigid and its loop as without delay, "
-    "as no device is. Give --delay and a [transmission]."
+    "which is true of no device. Give --delay and a [transmission]."
 )
 ADVICE = "Advice on {name}."
 VARIED, HALVED, NOT_VARIED = "Varied by 20 %: {0}.", "Halved and doubled: {0}.", "Not varied, as built: {0}."
 # Walls on which the case that breaks first is shown, as multiples of the wall that broke.
 _STIFFER, _UNSTEADY = (1.0, 1.05, 1.1, 1.2, 1.4, 1.7, 2.0), ("limit-cycle", "growing", "diverged")
-_RIGID = "There is no [transmission]: what a resonance of the structure takes is not in it."
+_RIGID = "The scene has no [transmission]: what a resonance of the structure costs is not included."
 _PLUGIN = "The scene's own wall is not tried: its elements come from a plugin file."
 HOLDS_MORE = (
-    "A {0} ({1}), which renders less than its wall, may hold more: {2:.2g} N/mm in the loop as described. It was not "
-    "tried in every corner; `haploop compare` tells what it holds."
+    "An element that renders less than its wall may hold more: {0} ({1}), {2:.2g} N/mm in the loop as described. It "
+    "was not tried in every corner; `haploop compare` shows what it holds."
 )
-FELL = "With {0} walls of {1} bear every corner at three holds; at more holds and under attack one of {2} does not."
+FELL = (
+    "With {0}, walls of {1} withstand every corner at three holds; at more holds and under attack, one of {2} does not."
+)
 NO_OTHER = (
-    "None of these bears {0:.2g} N/mm in every corner, a tenth more than the best of the wall alone, damping and "
-    "inertia, at seven parameters each: {1}."
+    "None of these elements, tried with seven parameter values each, allows {0:.2g} N/mm in every corner, a tenth more "
+    "than the best of the wall alone, damping and inertia: {1}."
 )
 READING = (
-    "Every corner: what is uncertain 20 % more or less, what is assumed half or twice, in all combinations, or 32 of "
-    "more, at holds of 0.3, 1 and 3 times the task's; a dash where an element allows no tenth more than the wall "
-    "alone. Attacked: at all holds, sways and approaches, as the first line; a dash where that was not tried, since "
-    "another bears more, or nearly as much with fewer elements. * where stiffer walls bear what a softer one does "
-    "not. Changes and assumptions: as described and in the corners hardest on the wall, at the three holds, with the "
-    "element advised at half to 1.4 of its size, and twice as far where an end of that suits best, or none; and "
-    "without one: same where the difference is within what the limits are known to. What is assumed counts as "
-    "described; none is attacked. Below: that wall fails, and none softer was tried."
+    "Every corner: uncertain quantities 20 % more or less, assumed ones halved or doubled, in all combinations, or 32 "
+    "if there are more, at holds of 0.3, 1 and 3 times the task's; a dash where an element does not allow a tenth more "
+    "than the wall alone. Attacked: at all holds, sways and approaches, as in the first line; a dash where that was "
+    "not tried, since another allows more, or nearly as much with fewer elements. *: stiffer walls withstand what a "
+    "softer one does not. Changes and assumptions: as described and in the corners hardest on the wall, at the three "
+    "holds, with the advised element at half to 1.4 times its size, twice as far if an end of that range suits best, "
+    "or with none; and, separately, without one. Same: the difference is within the accuracy of the limits. "
+    "Assumed numbers otherwise stay as described, and none of these walls is attacked. Below: that wall fails, and no "
+    "softer one was tried."
 )
-UNCHANGED = "as it is"
+UNCHANGED = "unchanged"
 SAFE_MEANS = (
     "at rest, or swinging by less than a hand feels, in position (Israr, Choi and Tan 2006) and in force (what would "
     "move device and hand by as much)"

@@ -32,8 +32,8 @@ _SCENE, _BREAKS = "advice.toml", "advice_breaks.toml"
 
 
 _OF_ANOTHER = (
-    "{out} holds an advice on another scene, {asked}; name another directory with --out, or give the device and the "
-    "options of that advice to go on with it."
+    "{out} contains advice on another scene, {asked}; name another directory with --out, or give the device and the "
+    "options of that advice to continue it."
 )
 
 
@@ -68,7 +68,7 @@ def advise(
             with _progress() as (stage, on_progress), Trial(store, workers, on_progress) as trial:
                 found = advice(asked, trial, stage)
         except KeyboardInterrupt:
-            leave(f"Interrupted; the same command with --out {out} goes on.", FAILED)
+            leave(f"Interrupted; the same command with --out {out} continues.", FAILED)
     if not as_json:
         console().print(report(found))
     data = _write(found, out)

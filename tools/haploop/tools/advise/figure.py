@@ -103,7 +103,7 @@ def _changes(ax: Axes, told: Advice, others: list[tuple[str, Limit, Limit | None
         stiffness = limit.stiffness_N_m
         size = (stiffness > nominal * WORTH) - (stiffness * WORTH < nominal)
         colour, label = (
-            (style.GREY, "as stiff within a tenth"),
+            (style.GREY, "equally stiff within a tenth"),
             (style.VERDICTS["steady"], "stiffer"),
             (_SOFTER, "softer"),
         )[size]
@@ -113,9 +113,9 @@ def _changes(ax: Axes, told: Advice, others: list[tuple[str, Limit, Limit | None
         seen |= {label} if stiffness else set()
         _beside(ax, row, ("", format_limit(limit), format_limit(alone) if alone else ""))
     if nominal:
-        ax.axvline(nominal / 1e3, color=style.INK, linewidth=1.2, label="as it is", zorder=1)
+        ax.axvline(nominal / 1e3, color=style.INK, linewidth=1.2, label="unchanged", zorder=1)
     has_element = bool(told.found.advised.values)
-    title = "after one change of the device, in the hardest corners" + ", the element tuned anew" * has_element
+    title = "after one change of the device, in the hardest corners" + ", with the element tuned again" * has_element
     _finish(ax, title, [name for name, *_ in others], [])
     _beside(ax, -0.85, ("", "element", "without") if has_element else ("", "", ""), bold=True)
     return [nominal, *(limit.stiffness_N_m for _, limit, _ in others)]

@@ -45,7 +45,7 @@ def formulas(loop: Scene) -> list[Formula]:
         Formula("K q <= 2 f_c", f"2 x {amount(friction, 'N')} / {amount(q, 'm')}" if q else "no encoder",
                 "chatters between two counts", ABBOTT, 2.0 * friction / q if q else math.inf),
         Formula("K <= 2 b / T", f"2 x {b:.3g} N s/m / {amount(period_s, 's')}",
-                "generates energy; friction or hand must take it", ABBOTT, 2.0 * b / period_s),
+                "generates energy; friction or hand must absorb it", ABBOTT, 2.0 * b / period_s),
     ]  # fmt: skip
     smooth = replace(loop, encoder=None, friction=None, noise=None, actuator=None, dissipation=())
     kinds = installed_kinds()
@@ -54,7 +54,7 @@ def formulas(loop: Scene) -> list[Formula]:
             limit = OneTickMap.from_scene(smooth, kinds).stiffness_limit()
         except NeverStable:
             limit = 0.0
-        found.append(Formula("rho(M) = 1", "exact map of a tick, no element", "grows, but for encoder and friction",
+        found.append(Formula("rho(M) = 1", "exact map of a tick, no element", "grows, encoder and friction aside",
                              "this loop, linear", limit))  # fmt: skip
     return found
 

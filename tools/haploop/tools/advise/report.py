@@ -19,36 +19,36 @@ from haploop.tools.linear.terms import one_count
 from haploop.tools.render.terminal import make_facts, make_table
 from haploop.tools.render.units import amount, fixed
 
-_NO_WALL = "none: no wall bears every case"
+_NO_WALL = "none: no wall withstands every case"
 _NOTHING_BREAKS = "nothing that was tried"
 # Trials compare force and motion with what is felt, with friction projected on the steps; a run is judged differently.
-_SHOWN_AT_END = "; advice_breaks.toml ends with it: its swing and its force there are felt, whatever its verdict"
+_SHOWN_AT_END = "; advice_breaks.toml ends with it: its swing and its force are felt there, whatever its verdict"
 _SHOWN_BY_NONE = "; no scene shows it: with friction solved exactly, as in a run, no hand would feel it"
 _FELT, _FELT_BOTH = {True: "force", False: "motion"}, "force and as motion"
-_AT, _TURNS = "at {hz:.0f} Hz", "at no one frequency, turning {turns} times in {within:g} s"
+_AT, _TURNS = "at {hz:.0f} Hz", "at no single frequency, turning {turns} times in {within:g} s"
 # A changed limit tells something if it differs by more than this, which is more than its tolerance.
 _TELLS = 1.2
 _NO_CHANGE, _NO_LOSS = "no single change that was tried gains a fifth", "no single change that was tried costs a sixth"
-_TUNED, _TIMES, _TIMES_ALONE = ", the element tuned anew", "{0}: {1} times", " ({0} without an element)"
-_GAINS_ALONE = "the wall without an element gains by more: {0}"
-_HAND = "of {0} kg, {1} N s/m and {2} N/m{3}, each 20 % more or less; another may make this wall buzz (--hand)"
+_TUNED, _TIMES, _TIMES_ALONE = ", with the element tuned again", "{0}: {1} times", " ({0} without an element)"
+_GAINS_ALONE = "the wall without an element gains from more changes: {0}"
+_HAND = "of {0} kg, {1} N s/m and {2} N/m{3}, each 20 % more or less; another hand may make this wall buzz (--hand)"
 _GRIP = ", holding through a grip of {0} N s/m and {1} N/m"
-_NO_HAND = "none but its force: a hand may make this wall buzz (--hand)"
+_NO_HAND = "none, only its force: a hand may make this wall buzz (--hand)"
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
 # What the run of the advised scene adds to "steady"; the search has tried the wall at every hold.
 _SOME_HOLDS = "at some holds of its hand"
-_ADDS = "of advice.toml, haploop run says beside its verdict: {0}"
-_PUSHED = "the pushes of that verdict are at some holds of its hand, the safe wall was tried at all of them"
+_ADDS = "haploop run says of advice.toml, beside its verdict: {0}"
+_PUSHED = "that run is pushed at only some holds of its hand; the safe wall was tried at all of them"
 _KICK = (
-    "of the encoder the element's force jumps by up to {0}, as far back, and the wall's by a step more: grit of some "
-    "twice that peak to peak in a slow press, which is no swing"
+    "as the encoder moves by one, the element's force jumps by up to {0} and back by as much, and the wall's force "
+    "by a step in addition: in a slow press, grit of about twice that peak to peak, which is not a swing"
 )
-_ALONE = "{0} without one, searched and attacked alike"
+_ALONE = "{0} without one, searched and attacked in the same way"
 # What is assumed, how much that costs, and what to measure.
-_ASSUMED = "{0}, neither measured nor published: the wall bears half and twice of {1}. {2}"
-_COSTS = "Were {0} right: about {1} with {2}, not attacked. {3}"
-_SAME = "Were {0} right, the wall would be as stiff within a tenth."
-_MEASURE = "Measure {0} first: it moves the wall most."
+_ASSUMED = "{0}, neither measured nor published: the wall withstands {1} at half and at twice its value. {2}"
+_COSTS = "If {0} were right: about {1} with {2}, not attacked. {3}"
+_SAME = "If {0} were right, the wall would be equally stiff within a tenth."
+_MEASURE = "Measure {0} first: it affects the wall most."
 
 
 def report(told: Advice) -> RenderableType:
@@ -59,7 +59,7 @@ def report(told: Advice) -> RenderableType:
         make_facts(answer(told), least_width=11),
         Text(),
         *(Text(note, style="dim") for note in told.notes),
-        Text(f"Tried by {told.tried_by}, in {told.found.cases} cases; {told.runs} runs.", style="dim"),
+        Text(f"Tried with {told.tried_by}, in {told.found.cases} cases; {told.runs} runs.", style="dim"),
         _elements(told),
         Text(READING, style="dim"),
         _limits(told),
@@ -102,7 +102,7 @@ def answer(told: Advice) -> list[tuple[str, str]]:
         lines.append(("published", ", ".join(values)))
     if told.own:
         own, failure = told.own
-        does = f"buzzes: {describe(failure)}" if failure else "bears every case"
+        does = f"buzzes: {describe(failure)}" if failure else "withstands every case"
         lines.append(("its own wall", f"{format_stiffness(own)} {does}"))
     return lines
 
@@ -211,7 +211,7 @@ def _changes(told: Advice) -> Table:
     has_element = bool(told.found.advised.values)
     close = f"to {CLOSE * 100:.0f} %"
     heads = (
-        (f"element tuned\nanew, {close}", "times\n", f"no element,\n{close}", " times\n")
+        (f"element tuned\nagain, {close}", "times\n", f"no element,\n{close}", " times\n")
         if has_element
         else (close, "times")
     )
@@ -233,7 +233,7 @@ def _factor(factor: float, limit: Limit, base: Limit) -> str:
 
 def _assumed(told: Advice) -> Table:
     heads = f"halved\nto {CLOSE * 100:.0f} %", f"doubled\nto {CLOSE * 100:.0f} %"
-    table = make_table("assumed of the device", "why", *heads, numbers=heads)
+    table = make_table("assumed about the device", "why", *heads, numbers=heads)
     for of, half, double in told.assumed:
         table.add_row(of.key, of.words, format_limit(half), format_limit(double))
     return table

@@ -38,18 +38,17 @@ _TOO_LATE = (
 )
 
 _TAKEN = "The hand is {0}, a pen-like grip (Fu and Cavusoglu 2012){1}; --hand names another."
-_CHANGED = ", but for {0} as set"
+_CHANGED = ", except for {0} as set"
 _NO_SPRING = (
-    "The scene's wall is of the kind {0}; advice is on springs, which are what it tries. "
-    "Take wall.kind out to be advised on a spring."
+    "The scene's wall is of the kind {0}, but advice tries springs only. Remove wall.kind to get advice on a spring."
 )
 _NOT_TRIED = (
-    "{} not among what is tried, which are haploop's own elements; a sweep over its parameter and wall.stiffness tries "
-    "any element (haploop scenes demo_damping prints one to start from)."
+    "{} not tried here: only haploop's own elements are. A sweep over a parameter of an element and wall.stiffness "
+    "tries any element (haploop scenes demo_damping prints one to start from)."
 )
 _STUCK = (
     "Dry friction of {0} holds the device against the hand's {1}: it would not press on the wall, and any wall would "
-    "seem safe. Give the friction as it is, in N, or a hand that presses harder (hand.force)."
+    "seem safe. Give the actual friction, in N, or a hand that presses harder (hand.force)."
 )
 
 # How a device file marks its assumed numbers.
@@ -127,7 +126,7 @@ def make_subject(
         raise InvalidRequest(_TOO_LATE.format(delay_s, MOST_DELAY_S))
     if scene.event:
         scene = apply_events(scene)
-        notes.append("What the scene's events change is taken as changed from the start.")
+        notes.append("What the scene's events change counts as changed from the start.")
     if (kind := class_of(scene.wall).kind) != "spring":
         raise InvalidRequest(_NO_SPRING.format(kind))
     rubs, presses_N = scene.friction, hold_N(make_loop(scene, has_task))

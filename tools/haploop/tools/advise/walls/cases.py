@@ -141,6 +141,6 @@ def attack(of: Ranges, hardest: Sequence[Corner] = ()) -> tuple[Case, ...]:
 def task_words(loop: Scene) -> str:
     """Returns what a wall is tried by, in one phrase."""
     return (
-        f"a tap at {TAP_M_S:g} m/s into holds of {HOLDS[0]:g} to {HOLDS[-1]:g} times {amount(hold_N(loop), 'N')}, that "
+        f"a tap at {TAP_M_S:g} m/s into holds of {HOLDS[0]:g} to {HOLDS[-1]:g} times {amount(hold_N(loop), 'N')} that "
         f"sway by {SWAY * 100:.0f} % at {SWAY_HZ / slowness(loop):.2g} Hz"
     )

@@ -126,8 +126,8 @@ class Store:
             yield
         except OSError as error:
             raise OutputError(
-                f"{self._file}, where what was tried is kept, cannot be used: {error.strerror}. Make room or give "
-                "another directory with --out; with the same one, what is in it already is not tried again."
+                f"{self._file}, which keeps the results of walls tried, cannot be used: {error.strerror}. Make room "
+                "or give another directory with --out; with the same one, what is in it already is not tried again."
             ) from error
 
 

@@ -25,7 +25,7 @@ STRETCH_S, FROM_S = 0.25, 0.75
 # many times as long.
 _DYING, _LONGER = 0.8, 4
 # The failure of a wall about which no case tells anything.
-_NO_CONTACT = "cannot be told: in no case is the device still at the wall after {0:g} s"
+_NO_CONTACT = "cannot be judged: in no case is the device still at the wall after {0:g} s"
 # Members that are worth a worker of their own.
 _PART = 150
 
