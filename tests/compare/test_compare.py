@@ -187,9 +187,10 @@ def test_what_may_differ_by_nothing_or_is_not_reproduced_cannot_be_told_apart():
 def test_the_sentences_follow_from_the_rankings():
     told = sentences([compared()])
     assert len(told) == 5
-    assert told[0] == "As described, most is held: on a device by no element more than without, 1.00 N/mm."
-    assert told[1].endswith("nothing where none is: nothing on a device.")
-    assert told[2] == "Damping cannot be told from no element on any of these loops."
+    lead = "What holds most in the loop as described: "
+    assert told[0] == f"{lead}on a device, no element is shown to hold more than none, 1.00 N/mm."
+    assert told[1].endswith("or nothing if there is none: nothing on a device.")
+    assert told[2] == "Damping cannot be told apart from no element on any of these loops."
     assert told[4].endswith("so adaptive inertia does not help, as far as can be told.")
     helped = sentences([compared(adaptive_damping_and_inertia=2000.0)])
     assert "inertia holds more on a device (1 of 1) than adaptive damping; adaptive inertia cannot" in helped[4]
@@ -202,7 +203,7 @@ def test_the_sentences_follow_from_the_rankings():
     assert mixed[4].endswith("helps on some loops and harms on others.")
     harmful = sentences([compared(unidirectional_inertia=500.0, adaptive_inertia=500.0)])
     assert harmful[3].startswith("Unidirectional inertia holds less on a device (1 of 1) than no element; ")
-    assert harmful[4].endswith("does not help, and harms.")
+    assert harmful[4].endswith("does not help, and does harm.")
 
 
 def test_loops_are_named_by_their_device_once_for_all_of_them():

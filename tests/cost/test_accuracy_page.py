@@ -129,7 +129,7 @@ def test_machine_code_has_a_row_and_a_half_sentence_of_its_own_and_leaves_the_ot
     before, after = rows(plain, "next digit"), rows(compiled, "next digit")
     assert {title: after[title] for title in before} == before
     assert after["A wall that steadies, machine code"][-1] == "any error"
-    assert takes_away(compiled) == f"{takes_away(plain)} With friction as machine code one is in none of them."
+    assert takes_away(compiled) == f"{takes_away(plain)} With friction as machine code, one is in none of them."
 
 
 def times_of(point: Point, share: float) -> Spread:
@@ -178,9 +178,9 @@ def test_on_a_machine_twice_as_slow_the_page_is_the_same_but_for_the_yardstick(c
 def test_the_dearest_effect_and_those_that_cost_nothing_are_told(cost: Cost) -> None:
     (effects,) = [group for group in cost.prices if group.name == "effects"]
     assert effects_sentence(effects) == (
-        "Alone, friction costs most, 15 (14–16) yardsticks a tick; 1 of 2 effects cannot be told from nothing."
+        "Alone, friction costs most, 15 (14–16) yardsticks a tick; 1 of 2 effects cannot be told apart from nothing."
     )
-    assert sum_sentence(effects) == "Added up they come to 15, all at once to 40 (39–41)."
+    assert sum_sentence(effects) == "Added up they cost 15, all at once 40 (39–41)."
 
 
 def test_the_one_sentence_says_where_nothing_beats_the_exact_flow(cost: Cost) -> None:

@@ -152,7 +152,7 @@ def test_ctrl_c_leaves_what_was_measured_and_the_same_command_goes_on(smooth, tm
         patched.setattr(Measurement, "times", interrupted)
         stopped = CliRunner().invoke(app, command)
     assert stopped.exit_code == 1
-    assert "the same command takes it up again" in stopped.stderr
+    assert "the same command continues from it" in stopped.stderr
     [half] = load(tmp_path / "out").scenes[0].points
     assert half.error
     assert half.time is None

@@ -177,7 +177,7 @@ def test_cost_json_is_read_back_as_it_was_and_another_file_is_refused(tmp_path):
     save(fake_cost(), tmp_path)
     assert load(tmp_path) == fake_cost()
     (tmp_path / "cost.json").write_text('{"machine": 1}')
-    with pytest.raises(CostFileError, match=r"no cost\.json of this version"):
+    with pytest.raises(CostFileError, match=r"is not a cost\.json of this version"):
         load(tmp_path)
     with pytest.raises(CostFileError, match="haploop cost --out"):
         load(tmp_path / "nowhere")

@@ -25,12 +25,12 @@ from haploop.tools.command.options import (
 )  # fmt: skip
 
 _NO_BOUND = (
-    "Force bounding is left out: of any wall that is pressed slowly it holds 2 b / T, b the damping that the device "
-    "declares, here {0}."
+    "Force bounding is left out: of any wall that is pressed slowly, it holds 2 b / T, where b is the damping that the "
+    "device declares; here {0}."
 )
 _ONE_DEVICE = (
-    "One device was expected, whose stabilizers are compared, but {0} and {1} were given. What differs between two "
-    "runs is told by haploop diff {0} {1}, and drawn by haploop plot {0} {1}."
+    "One device was expected, to compare stabilizers on it, but {0} and {1} were given. What differs between two runs "
+    "is listed by haploop diff {0} {1}, and drawn by haploop plot {0} {1}."
 )
 ROWS, COMPARISON, FIGURE = "rows.jsonl", "comparison.json", "comparison.png"
 
@@ -53,7 +53,7 @@ def compare(
     workers: Annotated[int | None, typer.Option(help="processes [as many as cores]", show_default=False)] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="directory; one of a comparison goes on [runs/compare-DEVICE-TIME]"),
+        typer.Option(help="directory; a comparison in it is continued [runs/compare-DEVICE-TIME]"),
     ] = None,
     json: Json = False,
 ) -> None:
@@ -113,7 +113,7 @@ def _compare(subject: Subject, grid: bool, workers: int | None, out: Path | None
     try:
         told = find(subject, grid, workers, out / ROWS)
     except KeyboardInterrupt:
-        leave(f"Interrupted; the same command with --out {out} goes on.", FAILED)
+        leave(f"Interrupted; the same command with --out {out} continues.", FAILED)
     if not as_json:
         console().print(report(told))
     data = comparison_data(told)

@@ -70,7 +70,7 @@ def variants(loop: Scene) -> dict[str, Scene]:
     clock, actuator = loop.clock, loop.actuator or Actuator()
     found = {DESCRIBED: loop}
     later = clock.round_trip_delay + _LATER_S
-    found[f"{_LATER_S * 1e3:g} ms of delay more"] = with_value(loop, "clock.round_trip_delay", later)
+    found[f"{_LATER_S * 1e3:g} ms more delay"] = with_value(loop, "clock.round_trip_delay", later)
     if step := value_at(loop, "encoder.resolution"):
         found["encoder four times as fine"] = with_value(loop, "encoder.resolution", step * _FINER)
     if actuator.bandwidth is None or actuator.bandwidth > _DRIVE_HZ:

@@ -46,6 +46,6 @@ def task_words(loop: Scene) -> str:
     sways = " to ".join(f"{often / slowness(loop):.2g}" for often in _SWAY_HZ)
     return (
         f"taps at {_TAP_M_S[0]:g} to {_TAP_M_S[1]:g} m/s into holds of {HOLDS[0]:g} to {HOLDS[-1]:g} times "
-        f"{amount(hold_N(loop), 'N')}, that sway by 0 to {SWAY * 100:.0f} % at {sways} Hz, device, hand and delay "
+        f"{amount(hold_N(loop), 'N')} that sway by 0 to {SWAY * 100:.0f} % at {sways} Hz, with device, hand and delay "
         "up to 20 % off"
     )

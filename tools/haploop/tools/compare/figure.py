@@ -75,16 +75,16 @@ def _gains(ax: Axes, told: Comparison) -> None:
     _finish(ax, f"{told.name}{delay}", "held more than without any element, N/mm", of)
     ax.set_yticks(range(len(names)), names, fontsize=6.5)
     for marker, colour, fill, label in (
-        ("o", _GREY, _GREY, "seeds told"),
+        ("o", _GREY, _GREY, "seeds shown"),
         ("s", _GREY, "white", "other seeds, other tuning"),
-        ("o", style.WALL, style.WALL, "not told from the best"),
+        ("o", style.WALL, style.WALL, "not told apart from the best"),
     ):
         ax.plot([], [], marker, color=colour, markerfacecolor=fill, markersize=4.5, label=label)
     _legend(ax)
     value = format_stiffness(held(without(of.rows)).value)
     ax.set_xlabel(
         f"held more than without any element ({value}), N/mm;\n"
-        f"mean and 95 % over {told.effort.seeds} seeds; ▲ ▼ told from none",
+        f"mean and 95 % over {told.effort.seeds} seeds; ▲ ▼ told apart from none",
         fontsize=style.SMALL,
     )
 

@@ -43,15 +43,15 @@ DEVICES = {"premium15_cable": None, "touch": "1 ms", "omega3": "1 ms"}
 _INTRO = """\
 Every stabilizer that comes with haploop, each tuned by the same search with the same effort on the same task, then
 tried under seeds that the search has not seen. Written by `make comparison`; `haploop compare DEVICE` does the same
-for a device or a scene of yours. One is said to hold *more* than another where their difference, seed by seed under the
-same conditions, is more than three of its standard errors, the same way under two sets of seeds that share nothing,
-tuning included; all else cannot be told apart. A device file without a cable is taken as rigid, which without a delay
-would bear walls that no device renders: such a device has a round trip of 1 ms here."""
+for a device or a scene of yours. One is said to hold *more* than another if their difference, seed by seed under the
+same conditions, is more than three of its standard errors, in the same direction under two sets of seeds that share
+nothing, tuning included; otherwise the two cannot be told apart. A device file without a cable is taken as rigid.
+Without a delay, such a device would withstand walls that no device renders, so here it has a round trip of 1 ms."""
 _HELPS = "so adaptive inertia helps, but nowhere more than every other element"
 _BEST = "so adaptive inertia helps, and on {0} it is what to take"
 _MIXED = "so adaptive inertia helps on some loops and harms on others"
 _HARMS, _NOT = (
-    "so adaptive inertia does not help, and harms",
+    "so adaptive inertia does not help, and does harm",
     "so adaptive inertia does not help, as far as can be told",
 )
 _HEADS = {
@@ -60,12 +60,13 @@ _HEADS = {
     "device ±20 %": "device ±20 %", "breaks first": "breaks first",
 }  # fmt: skip
 _BESIDE = """\
-On like loops: what is held without any element, and how much more with each, N/mm. Parameters are searched about
-those above alone, {around} by {tuning} seeds, the best {finalists} and those above by {last}, and tried by {seeds}."""
+On similar loops: what is held without any element, and how much more with each, N/mm. Parameters are searched
+only around those above: {around} with {tuning} seeds, the best {finalists} and those above with {last}; tried with
+{seeds}."""
 _LIMITS = """\
 Seeds draw holds, sways, taps, device, hand and delay; they do not draw another friction, another hand or another task,
-and numbers that the device files assume are taken as they are. Parameters are tuned for what is held, not for the
-ripple. A virtual coupling holds less than its wall. What is told as at the end of a search may be more with other
+and numbers that the device files assume are taken as given. Parameters are tuned for what is held, not for the ripple.
+A virtual coupling holds less than its wall. What is marked as at the end of a search may hold more with other
 parameters."""
 
 # What inertia adds: to adaptive damping, and by itself.
@@ -85,9 +86,10 @@ def sentences(comparisons: Sequence[Comparison]) -> list[str]:
     inertia = "; ".join(versus(UNIDIRECTIONAL, other, loops) for other in (NOTHING, DAMPING, BIDIRECTIONAL))
     adaptive = "; ".join(versus(*pair, loops) for pair in _ADAPTIVE)
     return [
-        f"As described, most is held: {'; '.join(_most(told.name, told.loops[0]) for told in comparisons)}.",
-        f"Take the first in the list that is told to hold more than no element and less than no other, "
-        f"nothing where none is: {take}.",
+        "What holds most in the loop as described: "
+        f"{'; '.join(_most(told.name, told.loops[0]) for told in comparisons)}.",
+        f"Take the first in the list that is shown to hold more than no element and not shown to hold less than "
+        f"any other, or nothing if there is none: {take}.",
         _sentence(versus(DAMPING, NOTHING, loops)),
         _sentence(inertia),
         _sentence(f"{adaptive}; {_verdict(loops)}"),
@@ -99,8 +101,8 @@ def versus(some: Family, other: Family, loops: Loops) -> str:
     where, than = _compared(some, other, loops), "no element" if other is NOTHING else other.name
     told = [f"{word} {_counted(where[word], loops)}" for word in ("more", "less") if where[word]]
     if not told:
-        return f"{some.name} cannot be told from {than} on any of these loops"
-    elsewhere = ", and cannot be told from it elsewhere" * bool(where["alike"])
+        return f"{some.name} cannot be told apart from {than} on any of these loops"
+    elsewhere = ", and cannot be told apart from it elsewhere" * bool(where["alike"])
     return f"{some.name} holds {', '.join(told)} than {than}{elsewhere}"
 
 
@@ -147,10 +149,10 @@ def _verdict(loops: Loops) -> str:
 def _most(device: str, of: OfLoop) -> str:
     (found, tied), alone = best(of), format_stiffness(held(without(of.rows)).value)
     if choice(of).family == NOTHING.name:
-        return f"on {device} by no element more than without, {alone}"
+        return f"on {device}, no element is shown to hold more than none, {alone}"
     # Some names have a comma.
-    alike = f"as much may hold: {' / '.join(row.family for row in tied)}" if tied else "more than every other"
-    return f"on {device} by {found.family}, {format_stiffness(held(found).value)} against {alone} without ({alike})"
+    alike = f"may hold as much: {' / '.join(row.family for row in tied)}" if tied else "more than every other"
+    return f"on {device}, {found.family}: {format_stiffness(held(found).value)} against {alone} without ({alike})"
 
 
 def _sentence(words: str) -> str:
@@ -210,6 +212,6 @@ if __name__ == "__main__":
     try:
         print(write(Path(sys.argv[1]), Path(sys.argv[2])))
     except KeyboardInterrupt:
-        leave("Interrupted; the same command goes on.", FAILED)
+        leave("Interrupted; the same command continues.", FAILED)
     except FigureError as error:
         leave(str(error), WRONG_USE)

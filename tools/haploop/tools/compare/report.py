@@ -21,19 +21,19 @@ from haploop.tools.render.units import amount, fixed
 from haploop.tools.search.intervals import mean_interval
 
 READING = (
-    "Wall set: the stiffest that is safe in all conditions of a seed, as are all softer ones tried, mean over the "
-    "seeds. Wall held: mean force over mean measured penetration of that wall. More than none: held, less what is "
-    "held without any element under the same seed, mean and 95 % interval over the seeds. Contact: slope of the force"
-    " on the first way in. Ripple: of the command above 30 Hz, peak to peak. Extra: the element's own force, largest "
-    "and root mean square. ±20 %: what is held with all parameters, or the device, 20 % less and 20 % more, over that"
-    " without. Breaks first: the softest wall that failed under any seed. * a parameter at the end of its search, "
-    "whose smallest is about none; † no wall was too stiff: with others more may be held. ▲ ▼ told to hold more, or "
-    "less, than none: by three standard errors, the same way under two sets of seeds, each with its own tuning. Bold:"
-    " not told from the best by the same rule."
+    "Wall set: the stiffest that is safe in all conditions of a seed, as are all softer ones tried; mean over the "
+    "seeds. Wall held: mean force over mean measured penetration of that wall. More than none: wall held, minus that "
+    "without any element under the same seed; mean and 95 % interval over the seeds. Contact: slope of the force on "
+    "the first way in. Ripple: of the command above 30 Hz, peak to peak. Extra: the element's own force, largest and "
+    "root mean square. ±20 %: what is held with all parameters, or the device, 20 % less and 20 % more, as a multiple "
+    "of what is held without the change. Breaks first: the softest wall that failed under any seed. *: a parameter at "
+    "an end of its search; the smallest amounts to about no element. †: no wall was too stiff; other parameters may "
+    "hold more. ▲ ▼: shown to hold more, or less, than none, by three standard errors, in the same direction "
+    "under two sets of seeds, each with its own tuning. Bold: not told apart from the best by the same rule."
 )
 SIGNS = {"more": " ▲", "less": " ▼", "alike": ""}
 _TIED = "{0} renders most, {1}; it cannot be told apart from {2}."
-_NO_GAIN = "No element can be told to hold more than none, {0}."
+_NO_GAIN = "No element is shown to hold more than none, {0}."
 _FIRST = "{0} renders most, {1}, and more than every other."
 _AGAIN = "{0} of {1} pairs that differ under these seeds do so under others, too; {2} are the other way round."
 
@@ -57,11 +57,12 @@ def report(told: Comparison) -> RenderableType:
 def task_sentence(told: Comparison) -> str:
     effort = told.effort
     return (
-        f"Tried by {told.task}; a seed draws {effort.of_seed} such conditions. Of each element {effort.points + 1} "
-        f"sets of parameters are tried by {effort.first} seeds, the best {effort.finalists} and {effort.around} about "
-        f"them by {effort.tuning}, the best {effort.finalists} and the smallest by {effort.last}; of what then holds "
-        f"as much within a standard error the one that adds the least force is tried by {effort.seeds}, each "
-        "time others. A wall to build with is one that `haploop advise` has tried, in some thousand cases."
+        f"Tried with {told.task}; a seed draws {effort.of_seed} such conditions. Of each element, {effort.points + 1} "
+        f"sets of parameters are tried with {effort.first} seeds, the best {effort.finalists} and {effort.around} "
+        f"around them with {effort.tuning}, the best {effort.finalists} and the smallest with {effort.last}; of those "
+        "that then hold as much within a standard error, the one that adds the least force is tried with "
+        f"{effort.seeds}, each time other seeds. A wall to build with is one that `haploop advise` has tried, in some "
+        "thousand cases."
     )
 
 

@@ -23,8 +23,8 @@ def cost(
     methods: Annotated[str | None, typer.Option(help="integrators, comma-separated [all]")] = None,
     out: Annotated[Path, typer.Option(help="directory; what it holds is not measured again")] = Path("runs/cost"),
     tolerance: Annotated[float, typer.Option(help="RMS error the advice is for, m")] = 1e-6,
-    repeats: Annotated[int, typer.Option(help="of each time")] = 7,
-    processes: Annotated[bool, typer.Option("--processes/--no-processes", help="time what processes cost too")] = True,
+    repeats: Annotated[int, typer.Option(help="repeats of each timing")] = 7,
+    processes: Annotated[bool, typer.Option("--processes/--no-processes", help="also time what processes cost")] = True,
     json: Json = False,
 ) -> None:
     """Measure what accuracy costs in time. Error and time of every method at every plant rate, and advice.
@@ -64,7 +64,7 @@ def cost(
         result = measurement.cost(tolerance)
     save(result, out)
     if interrupted:
-        leave(f"Stopped; what was measured is in {out}, and the same command takes it up again.", FAILED)
+        leave(f"Stopped; what was measured is in {out}, and the same command continues from it.", FAILED)
     if json:
         print_json(dataclasses.asdict(result))
     else:

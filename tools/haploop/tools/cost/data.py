@@ -258,4 +258,4 @@ def load(directory: Path) -> Cost:
         why = f"{path} could not be read: {error.strerror}. Run haploop cost --out {directory}."
         raise CostFileError(why) from error
     except (ValidationError, ValueError) as error:
-        raise CostFileError(f"{path} is no cost.json of this version: {error}") from error
+        raise CostFileError(f"{path} is not a cost.json of this version: {error}") from error

@@ -21,8 +21,8 @@ _NOTHING_M = 1e-9
 DIGITS_M = (30e-6, 10e-6, 3e-6, 1e-6, 1e-7)
 
 _ALIKE = (
-    "In a run of {scene}, both at {rate}, {rival} takes {in_run} times as long as the exact flow, which has code of "
-    "its own; written alike its step takes {alike} times as long."
+    "In a run of {scene}, both at {rate}, {rival} takes {in_run} times as long as the exact flow, which has dedicated "
+    "code; written alike, its step takes {alike} times as long."
 )
 
 
@@ -227,7 +227,7 @@ def takes_away(cost: Cost) -> str:
         return without
     rows = [exact_below_m(with_machine_code(scene)) for scene in cost.scenes]
     left = sum(below is not None and math.isfinite(below) for below in rows)
-    return f"{without} With friction as machine code one is in {left or 'none'} of them."
+    return f"{without} With friction as machine code, one is in {left or 'none'} of them."
 
 
 def _takes_away(scenes: list[SceneCost]) -> str:
@@ -240,7 +240,7 @@ def _takes_away(scenes: list[SceneCost]) -> str:
         )
     ends = " to ".join(dict.fromkeys(amount(below, "m", 2) for below in (pays[0], pays[-1])))
     where = f"{always} of {len(known)} scenes no method was found cheaper than the exact flow at any error"
-    return f"In {where}; in the others one is, where an error above {ends} will do."
+    return f"In {where}; in the others one is, if an error above {ends} is acceptable."
 
 
 def effects_sentence(group: PriceGroup) -> str:
@@ -250,7 +250,7 @@ def effects_sentence(group: PriceGroup) -> str:
     free = sum(adds.low <= 0.0 for adds in alone.values())
     return (
         f"Alone, {dearest} costs most, {interval(alone[dearest])} yardsticks a tick; "
-        f"{free} of {len(alone)} effects cannot be told from nothing."
+        f"{free} of {len(alone)} effects cannot be told apart from nothing."
     )
 
 
@@ -258,7 +258,7 @@ def sum_sentence(group: PriceGroup) -> str:
     """Makes a sentence that compares the sum of what effects add alone with what they add together."""
     together = next(price.adds for price in group.prices if price.adds and price.what == WHOLE)
     added = fixed(sum(adds.median for adds in _alone(group).values()), 2)
-    return f"Added up they come to {added}, all at once to {interval(together)}."
+    return f"Added up they cost {added}, all at once {interval(together)}."
 
 
 def _alone(group: PriceGroup) -> dict[str, Spread]:

@@ -160,7 +160,7 @@ def outcome(candidate: Candidate, reference: Reference, swings: Sequence[Swings]
             ran = trajectory(candidate.scene)
             others = [] if reference.pointwise else [trajectory(each) for each in starts(candidate.scene)[1:]]
     except (ElementError, ArithmeticError, np.linalg.LinAlgError) as error:
-        return Outcome(None, f"Could not go on: {error}", 0)
+        return Outcome(None, f"Could not continue: {error}", 0)
     ticks = ran.summary["ticks"]
     if failure := next(filter(None, (_failure(each, reference) for each in [ran, *others])), None):
         return Outcome(None, failure, ticks)
@@ -171,7 +171,7 @@ def _failure(ran: Trajectory, reference: Reference) -> str | None:
     if ran.summary["ended"] in ("diverged", "failed"):
         return f"Diverged: {ran.summary['why']}."
     if not np.isfinite(ran.x_m).all():
-        return "Not finite: a position is no number."
+        return "Not finite: a position is not a number."
     if len(ran.x_m) != len(reference.x_m):
         return f"Ended after {len(ran.x_m) - 1} ticks, the reference after {len(reference.x_m) - 1}."
     return None

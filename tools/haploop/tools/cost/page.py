@@ -31,45 +31,45 @@ from haploop.tools.render.units import amount, fixed
 _POINTWISE = {"end m": "final_m", "RMS m": "rms_m", "max m": "max_m", "residual": "residual"}
 _SWINGS = {"swing": "amplitude", "freq.": "frequency", "energy": "energy_per_cycle", "residual": "residual"}
 _READING = (
-    "Errors are x - x_ref at the end, RMS and largest over the ticks; or relative ones of the mean swing's amplitude, "
-    "frequency and energy a cycle. Residual: of the energy moved. Time: of a tick in one process, books, no log, over "
-    "the yardstick; interval: 95 %, of the median. Starting up is left out; in brackets: of the few ticks before a "
-    "failure. Bold: the scene's own setting."
+    "Errors: x - x_ref at the end, RMS and largest over the ticks; or relative errors of the mean swing's amplitude, "
+    "frequency and energy a cycle. Residual: share of the energy moved. Time: of a tick in one process, with books and "
+    "no log, divided by the yardstick's; interval: 95 %, of the median. Start-up is left out; in brackets: of the few "
+    "ticks before a failure. Bold: the scene's own setting."
 )
 # Groups that are shown in a table; the others are curves of the figure.
 _TABLED = ("books", "log", "processes")
 PAGE, FIGURE, PRICES_FIGURE = "accuracy.md", "accuracy.png", "accuracy_prices.png"
 _INTRO = """\
-Which method, what the next digit costs, what each effect costs. Every number was measured by `haploop cost` and
-written by `make accuracy`; the command prints all of them. An *error* is the root mean square, over the ticks of a
+Which method to take, what the next digit costs, what each effect costs. Every number was measured by `haploop cost`
+and written by `make accuracy`; the command prints all of them. An *error* is the root mean square, over the ticks of a
 run, of the position's distance from a reference in 50 digits. A *time* is that of a simulated tick with all energy
-books, over that of a yardstick timed before and after it: a median, and in brackets its 95 % interval. Times whose
-intervals overlap are not ranked."""
+books, divided by that of a yardstick timed before and after it: a median, and in brackets its 95 % interval. Times
+whose intervals overlap are not ranked."""
 # By kind of table, what stands below it.
 _BELOW = {
     "digits": f"""\
 Each cell names the cheapest setting, or all that are as cheap, and the time of the first. Below the error in the last
-column no method was found that takes less time than the exact flow. Friction is what makes a tick dear: the exact
-flow finds each stop and start to the last digit, the one-step methods let them fall on plant steps and have an error
-of first order, whatever their own order is. Rows of *machine code* are with the extra `numba`, which sweeps, `advise`
-and runs of 20 s or more use for the exact flow with friction, to the same bits; all others, and all times below, are of
-Python and NumPy alone.
+column no method was found that takes less time than the exact flow. Friction is what makes a tick expensive: the exact
+flow finds each stop and start to the last digit, while the one-step methods let them fall on plant steps and have an
+error of first order, whatever their own order is. Rows of *machine code* are with the extra `numba`, which sweeps,
+`advise` and runs of 20 s or more use for the exact flow with friction, with the same bits; all others, and all times
+below, are of Python and NumPy alone.
 
 ![Error of each method against the time of a tick, scene by scene]({FIGURE})""",
     "alike": """\
-Without friction a step of any of these methods is a small linear map. Operations are additions and multiplications,
-counted; times are of steps of 4096 motions in arrays, every method by the same kind of formula. Operations a tick are
-those at the lowest of the plant rates compared that is exact enough; a dash where none was.""",
+Without friction, a step of any of these methods is a small linear map. Operations are additions and multiplications,
+counted; times are of steps of 4096 motions in arrays, with the same kind of formula for every method. Operations a tick
+are those at the lowest of the compared plant rates that is exact enough; a dash if none was.""",
     "swings": """\
 Here a start moved by 1 µm ends somewhere else, so neither positions nor single swings can be compared. The error is
 that of the mean amplitude over 30 starts 1 µm apart, each against the exact flow from the same start, with its 95 %
 interval; *at most* where that reaches 0. Methods whose intervals overlap are not ranked.""",
 }
 _EFFECTS = """\
-Each effect by itself, with its values of `all_effects.toml`, is added to a mass in a hand of 10 kg that swings by 30
-mm through a soft wall; so the motion stays what it was, within the last column. Effects of the accelerometer are
-added to an ideal one. Whatever needs bodies in a row (cable, grip, bandwidths, friction, jitter, loss) pays for them
-alone, and shares them with others."""
+Each effect alone, with its values in `all_effects.toml`, is added to a mass in a hand of 10 kg that swings by 30 mm
+through a soft wall, so that the motion changes by no more than the last column says. Effects of the accelerometer are
+added to an ideal one. An effect that needs bodies in a row (cable, grip, bandwidths, friction, jitter, loss) pays for
+them when it is alone, and shares them with others."""
 
 
 def report(cost: Cost) -> RenderableType:
@@ -142,7 +142,7 @@ def yardstick(cost: Cost) -> str:
         return f"{words}."
     average = "" if load.average is None else f", under a load average of {load.average:.1f}"
     varied = f"its middle half lay within {100 * load.variation:.0f} %{average}"
-    clocks = "Times in one process are the processor's, those as processes the clock's."
+    clocks = "Times in one process are processor time, those as processes are clock time."
     return f"{words}; here it took {fixed(load.yardstick_us)} µs ({varied}). {clocks}"
 
 
@@ -208,7 +208,7 @@ def _moved(moves_m: float | None) -> str:
 def main() -> None:
     """Runs ``python -m haploop.tools.cost.page DIRECTORY DOCS``."""
     if len(sys.argv) != 3:
-        leave("Two directories were expected: that of a haploop cost, and where the page goes.", WRONG_USE)
+        leave("Two directories were expected: the one that haploop cost wrote, and the one for the page.", WRONG_USE)
     try:
         print(write(Path(sys.argv[1]), Path(sys.argv[2])))
     except (CostFileError, FigureError) as error:

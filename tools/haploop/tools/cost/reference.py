@@ -83,7 +83,7 @@ def made_now(name: str, scene: Scene) -> Reference:
         f"at {half / 1000:g} kHz is from it."
     )
     if scene.jitter:
-        how += " Jitter is drawn in whole plant steps, so every plant rate poses another problem."
+        how += " Jitter is drawn in whole plant steps, so every plant rate poses a different problem."
     return Reference(
         scene=name,
         how=how,
