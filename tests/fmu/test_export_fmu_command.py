@@ -104,7 +104,7 @@ def test_where_there_is_no_compiler_it_says_what_to_install(
 
 
 @pytest.mark.parametrize(
-    ("script", "words"), [("printf 'broken \\377' >&2; exit 3", "broken \ufffd"), ("exit 0", "it said nothing")]
+    ("script", "words"), [("printf 'broken \\377' >&2; exit 3", "broken \ufffd"), ("exit 0", "it printed nothing")]
 )
 def test_a_compiler_that_fails_is_quoted_and_leaves_nothing(
     script: str, words: str, wall: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -113,7 +113,7 @@ def test_a_compiler_that_fails_is_quoted_and_leaves_nothing(
     fake.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
     fake.chmod(fake.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("CC", f"'{fake}'")
-    refused(export(wall, "--out", tmp_path / "mine.fmu"), 1, "made no library", words, "CC=gcc")
+    refused(export(wall, "--out", tmp_path / "mine.fmu"), 1, "produced no library", words, "CC=gcc")
     assert list(tmp_path.glob("*.fmu*")) == []
 
 
@@ -135,7 +135,9 @@ def test_an_element_of_a_plugin_is_refused_though_it_has_the_name_of_one_that_is
     one = scene(wall={"position": -0.06, "stiffness": 150}, dissipation=[{"kind": "damping", "damping": 0.5}])
     controller_of(one)
     monkeypatch.setattr("haploop.tools.fmu.variables.registry", lambda: {"damping": Mine})
-    with pytest.raises(NotExportable, match=r"dissipation\.0 is damping, which is Python; an FMU holds damping, "):
+    with pytest.raises(
+        NotExportable, match=r"dissipation\.0 is damping, which is Python code; an FMU supports only damping, "
+    ):
         controller_of(one)
 
 
@@ -149,5 +151,7 @@ def test_every_estimator_and_element_that_comes_with_haploop_and_asks_for_nothin
 
 def test_a_stabilizer_is_refused_by_its_name() -> None:
     one = scene(wall={"position": -0.06, "stiffness": 150}, dissipation=[{"kind": "force-bounding"}])
-    with pytest.raises(NotExportable, match=r"dissipation\.0 is force-bounding, which is Python; an FMU holds"):
+    with pytest.raises(
+        NotExportable, match=r"dissipation\.0 is force-bounding, which is Python code; an FMU supports only"
+    ):
         controller_of(one)

@@ -140,7 +140,7 @@ def test_over_an_encoder_either_the_rate_or_the_friction_bounds(
 @pytest.mark.parametrize(
     ("name", "tables", "why"),
     [
-        (COLGATE, damped(0.1, delay=0.0013), "1.3 ms is no whole number of ticks"),
+        (COLGATE, damped(0.1, delay=0.0013), "1.3 ms is not a whole number of ticks"),
         (COLGATE, damped(0.1, actuator={"bandwidth": 500.0}), "actuator lags"),
         (COLGATE, damped(0.1, acceleration={"source": "accelerometer"}), "accelerometer"),
         (COLGATE, {"dissipation": [{"kind": "unidirectional-inertia", "mass": 0.01}]}, "unidirectional-inertia"),

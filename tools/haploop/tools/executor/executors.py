@@ -147,7 +147,7 @@ class ProcessExecutor(Executor):
         except BrokenExecutor as error:
             self.close(at_once=True)
             raise ExecutorError(
-                "Worker processes cannot be started. In a script of your own, what it does must stand below "
+                "Worker processes cannot be started. In your own script, put what it does below "
                 '`if __name__ == "__main__":`, since every worker imports the script; or ask for one worker.'
             ) from error
 

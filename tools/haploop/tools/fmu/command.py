@@ -15,7 +15,7 @@ def export_fmu(
     scene: SceneFile,
     set: Set = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE.fmu", help="file, or directory [SCENE.fmu here]")] = None,
-    force: Annotated[bool, typer.Option("--force", help="write over a file that exists")] = False,
+    force: Annotated[bool, typer.Option("--force", help="overwrite an existing file")] = False,
 ) -> None:
     """Write the controller of a scene as an FMU, position to force. FMI 3.0, co-simulation, in C.
 

@@ -90,8 +90,8 @@ FMI fmi3Instance fmi3InstantiateCoSimulation(
     made->environment = environment;
     made->log = log;
     if (!token || strcmp(token, TOKEN)) {
-        tell(made, fmi3Error, "The instantiation token must be %s, but %s was given: model description and binary are "
-             "not of one FMU.", TOKEN, token ? token : "none");
+        tell(made, fmi3Error, "The instantiation token must be %s, but %s was given: model description and binary "
+             "do not belong to the same FMU.", TOKEN, token ? token : "none");
         free(made);
         return NULL;
     }
@@ -177,12 +177,12 @@ FMI fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 point_s, fmi3Float6
     *event = *terminate = *early = false;
     *reached_s = time_s(state);
     if (!of->stepping)
-        return tell(of, fmi3Error, "A step was asked before initialization had ended, or after the end.");
+        return tell(of, fmi3Error, "A step was requested before initialization had ended, or after the end.");
     if (!(fabs(point_s - *reached_s) * PLANT_RATE <= NEAR))
-        return tell(of, fmi3Discard, "A step must begin at %.9g s, where the FMU is, but was to begin at %.9g s.",
+        return tell(of, fmi3Discard, "A step must begin at %.9g s, the time of the FMU, but %.9g s was given.",
                     *reached_s, point_s);
     if (!(fabs(steps - whole) <= NEAR && whole >= 1.0 && whole <= left))
-        return tell(of, fmi3Discard, "A step of %.9g s was asked at %.9g s, but it must be a whole number of plant "
+        return tell(of, fmi3Discard, "A step of %.9g s was requested at %.9g s, but it must be a whole number of plant "
                     "steps of %.9g s and lead no further than the next tick, %.9g s on: the controller measures at "
                     "every tick.", size_s, *reached_s, 1.0 / PLANT_RATE, left / PLANT_RATE);
     if (into == 0) {
@@ -199,7 +199,7 @@ FMI fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *kept)
 {
     const struct Instance *of = instance;
     if (!*kept && !(*kept = malloc(sizeof of->state)))
-        return tell(of, fmi3Error, "There is no memory to keep a state in.");
+        return tell(of, fmi3Error, "There is not enough memory to keep a state.");
     memcpy(*kept, &of->state, sizeof of->state);
     return fmi3OK;
 }

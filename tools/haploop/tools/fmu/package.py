@@ -69,7 +69,9 @@ def host_platform() -> tuple[str, str]:
     machine, system = _MACHINES.get(platform.machine().lower()), _SYSTEMS.get(sys.platform)
     if machine is None or system is None:
         here = f"{platform.machine()} with {sys.platform}"
-        raise NotCompiled(f"Libraries are made on x86_64 or aarch64 with Linux or macOS, but this machine is {here}.")
+        raise NotCompiled(
+            f"Libraries can be built on x86_64 or aarch64 with Linux or macOS, but this machine is {here}."
+        )
     return f"{machine}-{system[0]}", system[1]
 
 
@@ -90,15 +92,15 @@ def _library(sources: dict[str, str], suffix: str) -> bytes:
             raise NotCompiled(
                 f"A C compiler was expected, but {compiler[0]} cannot be started ({error.strerror}). Install one "
                 "(Debian, Ubuntu: apt install gcc; Fedora: dnf install gcc; macOS: xcode-select --install), or name "
-                "one that is there: CC=/path/to/compiler haploop export-fmu ..."
+                "an installed one: CC=/path/to/compiler haploop export-fmu ..."
             ) from error
         except subprocess.TimeoutExpired as error:
-            raise NotCompiled(f"The C compiler {compiler[0]} was not done after {_COMPILE_S:g} s.") from error
+            raise NotCompiled(f"The C compiler {compiler[0]} did not finish within {_COMPILE_S:g} s.") from error
         if done.returncode or not library.exists():
             told = (done.stderr or done.stdout).decode(errors="replace").strip()
-            said = "\n".join(told.splitlines()[:8]) or "it said nothing"
+            said = "\n".join(told.splitlines()[:8]) or "it printed nothing"
             raise NotCompiled(
-                f"The C compiler made no library (exit status {done.returncode}): {shlex.join(command)}\n{said}\n"
-                "Another compiler can be named: CC=gcc haploop export-fmu ..."
+                f"The C compiler produced no library (exit status {done.returncode}): {shlex.join(command)}\n{said}\n"
+                "Name another compiler: CC=gcc haploop export-fmu ..."
             )
         return library.read_bytes()

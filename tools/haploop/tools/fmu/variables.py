@@ -84,20 +84,20 @@ def _obstacles(scene: Scene, params: ControllerParams) -> Iterator[str]:
     for index, active in enumerate(params.elements):
         if type(active.element) not in ELEMENTS:
             kinds = ", ".join(kind.kind for kind in ELEMENTS)
-            yield f"dissipation.{index} is {active.element.kind}, which is Python; an FMU holds {kinds}."
+            yield f"dissipation.{index} is {active.element.kind}, which is Python code; an FMU supports only {kinds}."
     if params.wall.kind != "spring":
-        yield f"wall.kind is {params.wall.kind}; an FMU holds springs."
+        yield f"wall.kind is {params.wall.kind}; an FMU supports only springs."
     for table, estimator in (("velocity", params.velocity), ("acceleration", params.acceleration)):
         if type(_unfiltered(estimator)[0]) not in ESTIMATORS:
-            yield f"{table}.estimator is {_unfiltered(estimator)[0].name}, which is Python of another package."
+            yield f"{table}.estimator is {_unfiltered(estimator)[0].name}, which is Python code of another package."
     for name in ("jitter", "loss"):
         if getattr(scene, name) is not None:
-            yield f"[{name}] draws random numbers for every command; take the table out."
+            yield f"[{name}] draws random numbers for every command; remove the table."
     for index, event in enumerate(scene.event):
         if event.swap or event.set:
-            yield f"event.{index} changes the loop at {event.at:g} s; an importer sets parameters itself. Take it out."
+            yield f"event.{index} changes the loop at {event.at:g} s; an importer sets parameters itself. Remove it."
     for name in scene.others:
-        yield f"[{name}] is of another package; whether the controller or the line knows it cannot be told."
+        yield f"[{name}] belongs to another package; whether the controller or the line uses it is unknown."
 
 
 def _unfiltered(estimator: Estimator) -> tuple[Estimator, float]:

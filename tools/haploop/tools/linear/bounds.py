@@ -80,7 +80,7 @@ def _passive(scene: Scene, kinds: Kinds) -> float:
     delay_s = scene.clock.round_trip_delay
     ticks = delay_s * scene.clock.control_rate
     if abs(ticks - round(ticks)) > 1e-6:
-        raise _DoesNotApply(f"The delay of {delay_s * 1e3:g} ms is no whole number of ticks.")
+        raise _DoesNotApply(f"The delay of {delay_s * 1e3:g} ms is not a whole number of ticks.")
     return _largest_passive_stiffness(scene, round(ticks), kinds)
 
 
@@ -124,10 +124,10 @@ def _force_over_motion(controller: LinearController, z: np.ndarray) -> np.ndarra
 def _soft(scene: Scene, kinds: Kinds) -> float:
     _refuse(scene, kinds, "lag", "bodies")
     if others := sorted({element.name for element in scene.dissipation} - {"damping"}):
-        raise _DoesNotApply(f"It knows no element but damping; the scene has {', '.join(others)}.")
+        raise _DoesNotApply(f"It covers no element but damping; the scene has {', '.join(others)}.")
     virtual = sum(element.parameters["damping"] for element in scene.dissipation)
     if virtual and scene.velocity:
-        raise _DoesNotApply("The velocity is no plain backward difference.")
+        raise _DoesNotApply("The velocity is not a plain backward difference.")
     mechanics, late_s = Mechanics.from_scene(scene), _half_period_s(scene) + scene.clock.round_trip_delay
     bound = (mechanics.damping + virtual) / late_s
     angle = math.sqrt((bound + mechanics.stiffness) / mechanics.mass_kg) * late_s
@@ -175,13 +175,13 @@ _OUTSIDE: dict[str, tuple[Callable[[Scene], object], str]] = {
     "accelerometer": (accelerometer_is_used, "The controller also reads an accelerometer, not the position alone."),
     "bodies": (
         lambda scene: scene.transmission or value_at(scene, "hand.grip"),
-        "Device and hand are no single rigid mass.",
+        "Device and hand are not a single rigid mass.",
     ),
     "elements": (
         lambda scene: scene.dissipation,
-        "It is of a spring alone; the scene has damping or dissipation elements.",
+        "It is for a spring alone; the scene has damping or dissipation elements.",
     ),
-    "delay": (lambda scene: scene.clock.round_trip_delay, "It is of a loop without delay."),
+    "delay": (lambda scene: scene.clock.round_trip_delay, "It is for a loop without delay."),
     "spring": (lambda scene: value_at(scene, "hand.stiffness"), "The hand has a spring."),
     "transmission": (lambda scene: scene.transmission, "The device is not rigid: it has a [transmission]."),
     "no encoder": (lambda scene: not scene.encoder, "The scene has no [encoder]."),

@@ -64,7 +64,7 @@ class OneTickMap:
         if curved := why_not_linear(scene, kinds):
             raise NotLinear(
                 "The stiffness limit is that of a linear loop: held forces on masses, springs and dampers. "
-                f"{scene.title!r} also has {', '.join(curved)}; take it out to ask for the limit."
+                f"{scene.title!r} also has {', '.join(curved)}; remove it to get the limit."
             )
         scene = with_spring(scene)
         after = _after_a_tick(scene, LinearController.from_scene(scene, kinds))
