@@ -135,7 +135,7 @@ def test_replay_says_whether_every_bit_agreed(done, tmp_path):
         (("run", FIG6C, "--pace", "0"), "A pace is a number from"),
         (("run", FIG6C, "--tcp", "0.0.0.0"), "directory of keys"),
         (("run", FIG6C, "--plugin", "nono.py"), "The plugin nono.py does not load: there is no such file."),
-        (("compare", "premium15", "runs/b"), "told by haploop diff premium15 runs/b, and drawn by haploop plot"),
+        (("compare", "premium15", "runs/b"), "listed by haploop diff premium15 runs/b, and drawn by haploop plot"),
         (("replay", "nowhere"), "nowhere"),
         (("plot", "nowhere"), "nowhere"),
         (("attach", "scope"), "logger, print or plotjuggler"),
