@@ -54,7 +54,7 @@ def test_a_wrong_quantity_is_told_with_the_nearest() -> None:
         result["/plant"]["forse"]
     with pytest.raises(SceneError, match=r"did you mean stiffness\?"):
         load("fig6c", {"wall.stifness": 1})
-    with pytest.raises(ValueError, match="kept in memory alone"):
+    with pytest.raises(ValueError, match="kept in memory only"):
         plot(result)
 
 
@@ -79,7 +79,7 @@ def test_one_run_or_several_are_drawn_and_a_sweep_is_drawn_by_itself(tmp_path: P
     assert plot([one, other], tmp_path / "both.svg").stat().st_size > 1000
     with pytest.raises(FigureError, match="There is no run to draw"):
         plot([])
-    with pytest.raises(ValueError, match="kept in memory alone"):
+    with pytest.raises(ValueError, match="kept in memory only"):
         plot([one, run(scene)])
 
 
@@ -101,7 +101,7 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
         assert other.id == loop.id
         monkeypatch.chdir("/")  # a relative directory stays where it was
         for timeout_s in (0.01, None):
-            with pytest.raises(CommandRefused, match=r"paused at tick 0 and comes to no end by itself: resume\(\)"):
+            with pytest.raises(CommandRefused, match=r"paused at tick 0 and does not end by itself: resume\(\)"):
                 loop.wait(timeout_s)
         for wrong in ("wall.stiffness", ["wall.stiffness=2 N/mm"]):
             with pytest.raises(TypeError, match=r'set by key: set\(\{"wall.stiffness": 200\}\)'):
@@ -120,7 +120,7 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
         assert other.wait(PATIENCE_S).summary == live.summary
         with pytest.raises(RunNotFound):
             loop.pause()
-    with start("fig6b", pace=0.01) as slow, pytest.raises(TimeoutError, match=r"still goes on after 0\.01 s"):
+    with start("fig6b", pace=0.01) as slow, pytest.raises(TimeoutError, match=r"is still running after 0\.01 s"):
         slow.wait(0.01)
     written = scene.swap("unidirectional-inertia", at=tick * 1e-3, mass=0.01).set({"wall.stiffness": 200}, at=0.2)
     assert live.summary["trajectory_sha256"] == run(written).summary["trajectory_sha256"]

@@ -118,7 +118,7 @@ def test_the_command_makes_keys_and_says_what_goes_to_another_host(tmp_path):
         (("status", "--at", "127.0.0.1:9", "--keys", "nowhere"), "There is no directory of keys nowhere"),
         (("status", "--at", "host.invalid:9"), "is no host that is known here"),
         (("join", "nowhere.json"), "nowhere.json cannot be read"),
-        (("join", __file__), "is none of the files that haploop run --external"),
+        (("join", __file__), "is not a file that haploop run --external"),
     ],
 )
 def test_an_address_or_keys_that_cannot_be_meant_are_a_sentence(arguments, words):

@@ -245,8 +245,8 @@ def test_a_slider_sets_when_it_is_let_go_and_shades_what_lies_beyond_the_limit(s
         page.keyboard.press("ArrowRight")
     coarse = pytest.approx(150 * 10 ** (3 / 200), rel=0.01)
     stand_in.ordered(lambda command: command["arguments"]["set"]["wall.stiffness"] == coarse)
-    stand_in.state(no_limit="not linear, by [jitter]")
-    expect(told).to_contain_text("no limit is shaded: not linear, by [jitter]")
+    stand_in.state(no_limit="not linear, because of [jitter]")
+    expect(told).to_contain_text("no limit is shaded: not linear, because of [jitter]")
     assert OPTIONS["settable"]["wall.position"]["value"] < 0
     expect(page.locator("input[aria-label='wall.position, coarse']")).to_be_hidden()
 

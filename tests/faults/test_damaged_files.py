@@ -47,7 +47,7 @@ def test_a_spoilt_command_line_is_answered_or_refused_with_a_sentence(tmp_path):
 def test_an_argument_that_is_no_text_is_refused_by_every_command(command, word):
     answer = ask(command, word)
     assert (answer.status, answer.broken()) == (2, "")
-    assert answer.stderr.startswith("Every argument, names of files too, must be UTF-8 text")
+    assert answer.stderr.startswith("Every argument, file names included, must be UTF-8 text")
 
 
 def test_what_the_operating_system_refuses_is_a_sentence_where_a_command_has_none():

@@ -163,7 +163,7 @@ def test_a_copy_of_every_file_is_read_anywhere_as_the_original(folder, name):
 
 
 def test_a_file_of_ones_own_that_a_bare_name_stands_for_is_noted():
-    own = "Note: demo is your own demo.toml, taken in place of the one that comes with haploop.\n"
+    own = "Note: demo is your own demo.toml, used in place of the one that comes with haploop.\n"
     assert own not in call("check", "demo").stderr
     Path("demo.toml").write_text(OWN)
     for command in ("check", "explain"):
@@ -177,7 +177,7 @@ def test_a_file_of_ones_own_that_a_bare_name_stands_for_is_noted():
 def test_files_of_ones_own_are_listed_and_no_others():
     assert "your own" not in call("scenes").stdout
     Path("fig6a.toml").write_text(OWN)
-    assert re.search(r"fig6a +here your own file is taken: fig6a.toml", call("scenes").stdout)
+    assert re.search(r"fig6a +your own file is used here: fig6a.toml", call("scenes").stdout)
     assert own_file("fig6b", "scenes") is None
 
 

@@ -81,7 +81,7 @@ def test_our_plant_does_not_take_an_unmodelled_hand_for_none(file: Path):
 def test_check_says_whose_plant_can_run_it(file: Path):
     answer = CliRunner().invoke(app, ["check", str(file)])
     assert answer.exit_code == 0
-    assert "can be run with a plant of yours" in answer.stderr
+    assert "can be run with your own plant" in answer.stderr
 
 
 def test_check_says_that_a_scene_has_no_wall_and_nothing_of_one_that_has(tmp_path: Path):

@@ -193,7 +193,7 @@ def test_a_loop_with_an_element_that_is_not_installed_has_no_limit_of_stiffness(
 def test_what_makes_a_loop_nonlinear_is_told_beside_an_element_that_is_not_installed():
     scene = load("fig6c").set({"jitter": {"kind": "gamma", "mean": 0.001, "deviation": 0.001}}).scene
     strange = replace(scene, dissipation=(ElementTable(name="of a plugin"),))
-    assert LiveRuns().stiffness_limit(strange) == "not linear, by [jitter]"
+    assert LiveRuns().stiffness_limit(strange) == "not linear, because of [jitter]"
 
 
 def test_of_a_loop_with_friction_the_limit_is_that_without_it():

@@ -145,7 +145,7 @@ def test_of_a_page_that_is_closed_while_its_run_goes_on_one_sentence_tells_and_n
         return await tab.phase("running")
 
     browse(run, play)
-    run.says("The page is gone; the run goes on. Where it stands still, haploop resume lets it go on")
+    run.says("The page is gone; the run continues. If it stands still, haploop resume continues it")
     run.signal(signal.SIGINT)
     assert '"ended": "stopped"' in run.end(0)
     assert "Fatal Python error" not in run.stderr

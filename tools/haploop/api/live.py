@@ -34,8 +34,8 @@ _LOOK_S, _ENDS_WITHIN_S, _TOLD = 0.01, 20.0, "told.txt"
 # Pace, in simulated seconds per second, of a run that is to stand still at its start: no tick after the first is due.
 _STANDING = 1e-6
 _PAUSED = (
-    "The run {0} is paused at tick {1} and comes to no end by itself: resume() lets it go on, finish() does, and waits "
-    "for its end."
+    "The run {0} is paused at tick {1} and does not end by itself: resume() continues it, finish() continues it "
+    "and waits for its end."
 )
 
 _TIME = Number(Quantity("s", at_least=0, about="time"))
@@ -260,14 +260,14 @@ class LiveLoop:
         if self._result:
             return self._result
         if not started and not run.is_here:
-            raise RunNotFound(f"The run at {self.id} leaves its files on its own host; wait for its end there.")
+            raise RunNotFound(f"The run at {self.id} keeps its files on its own host; wait for its end there.")
         with contextlib.suppress(RunNotFound):  # it has ended
             if (now := self.status())["paused"]:
                 raise CommandRefused(_PAUSED.format(run.id, now["tick"]))
         give_up = math.inf if timeout_s is None else time.monotonic() + timeout_s
         while started.process.poll() is None if started else run_directory.has_launcher(run):
             if time.monotonic() > give_up:
-                raise TimeoutError(f"The run {self.id} still goes on after {timeout_s} s.")
+                raise TimeoutError(f"The run {self.id} is still running after {timeout_s} s.")
             time.sleep(_LOOK_S)
         if started and started.process.returncode:
             raise RunFailed(started.told())

@@ -204,7 +204,7 @@ def plot(what: Result | str | Path | Sequence[Result | str | Path], target: str 
         directory = one.directory if isinstance(one, Result) else Path(one)
         if directory is None:
             raise ValueError(
-                "This run was kept in memory alone; give it a directory to be drawn from: run(scene, out=...)."
+                "This run was kept in memory only; give it a directory to draw it from: run(scene, out=...)."
             )
         directories.append(directory)
     return draw_any(directories, None if target is None else Path(target))

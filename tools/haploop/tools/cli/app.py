@@ -39,7 +39,7 @@ def _tell_version(is_asked: bool) -> None:
 @app.callback()
 def haploop(
     version: Annotated[
-        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="print the version and leave")
+        bool, typer.Option("--version", callback=_tell_version, is_eager=True, help="print the version and exit")
     ] = False,
 ) -> None:
     """Simulate a haptic loop: a device in a hand, a sampled controller with a virtual wall, a line with delay."""

@@ -11,14 +11,14 @@ import typer
 
 from haploop.tools.command.options import FAILED, WRONG_USE, Json, complete, leave, plain_errors, print_json
 
-_YOURS = "here your own file is taken: {0}"
+_YOURS = "your own file is used here: {0}"
 
 
 def scenes(
-    name: Annotated[str | None, typer.Argument(help="print this one's file, to be copied", show_default=False)] = None,
+    name: Annotated[str | None, typer.Argument(help="print this one's file, to copy it", show_default=False)] = None,
     json: Json = False,
 ) -> None:
-    """List the scenes, devices, hands and sweeps there are. A name means your own file first, then one of these."""
+    """List the available scenes, devices, hands and sweeps. A name means your own file first, then one of these."""
     from haploop.launch.scene.bundled import FOLDERS, about, bundled, of_name, own_file
     from haploop.protocol.names import meant
 
@@ -46,11 +46,11 @@ def scenes(
 
 
 def new(
-    file: Annotated[Path, typer.Argument(help="scene file to write, not there yet", show_default=False)],
+    file: Annotated[Path, typer.Argument(help="scene file to write; it must not exist yet", show_default=False)],
     device: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="that haploop scenes lists, or a file of yours", autocompletion=complete("devices")
+            metavar="NAME", help="one that haploop scenes lists, or your own file", autocompletion=complete("devices")
         ),
     ] = "premium15",
     hand: Annotated[
@@ -59,7 +59,7 @@ def new(
     wall: Annotated[
         str | None,
         typer.Option(
-            metavar="STIFFNESS", help="stiffness of the wall; else that of the files, or 0.5 N/mm", show_default=False
+            metavar="STIFFNESS", help="stiffness of the wall [that of the files, or 0.5 N/mm]", show_default=False
         ),
     ] = None,
 ) -> None:
@@ -76,7 +76,7 @@ def new(
         except FirstSceneError as error:
             leave(str(error), WRONG_USE)
         except FileExistsError:
-            leave(f"{file} is there already; name a file that is not.", WRONG_USE)
+            leave(f"{file} already exists; name a file that does not.", WRONG_USE)
         except OSError as error:
             with contextlib.suppress(OSError):  # a full disk leaves a broken file, which is removed
                 file.unlink()

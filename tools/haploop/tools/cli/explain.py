@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from haploop.tools.operations import Bill
 
 _READING = (
-    "A call into NumPy counts as one instruction. An entry's are those that the loop would save without it alone; "
-    "they are negative where something dearer takes its place."
+    "A call into NumPy counts as one instruction. An entry's instructions are those that the loop would save "
+    "without that entry alone; they are negative where something more expensive takes its place."
 )
 _OF_LIMITS = (
-    "A limit is of the formula's own loop: passive with any passive hand, or stable for small swings in lasting "
+    "A limit applies to the loop of its formula: passive with any passive hand, or stable for small swings in lasting "
     "contact; haploop judge says what a run does."
 )
 
@@ -178,7 +178,7 @@ def _count(scene: Scene, count: OneCount) -> Table:
     from haploop.protocol.walls.registry import make_wall
     from haploop.tools.linear.terms import DEEP_COUNTS
 
-    table = make_table("one count of the encoder, in the wall and from rest", "at most", numbers=("at most",))
+    table = make_table("effect of one encoder count, in the wall and from rest", "at most", numbers=("at most",))
     table.add_row("position", amount(count.x_m, "m"))
     table.add_row("velocity, as estimated", amount(count.v_m_s, "m/s"))
     if not (scene.acceleration and scene.acceleration.source == "accelerometer"):
@@ -213,7 +213,7 @@ def _inside(planned: Plan) -> Table:
 def _costs(scene: Scene, planned: Plan, costs: Bill) -> Table:
     """Makes the table of what each effect and each element adds."""
     numbers = ("states", "multiplications", "instructions")
-    table = make_table("what is named", "written in", "every", *numbers, numbers=numbers)
+    table = make_table("effect or element", "written in", "every", *numbers, numbers=numbers)
     for effect in planned.named:
         modules = effect.modules_in(scene)
         module = modules[0].removeprefix("haploop.") if modules else effect.node

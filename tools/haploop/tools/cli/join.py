@@ -17,7 +17,7 @@ from haploop.tools.command.options import FAILED, WRONG_USE, leave
 def join(
     file: Annotated[Path, typer.Argument(help="external-ROLE.json of a run with --external ROLE", show_default=False)],
 ) -> None:
-    """Join a run that waits with --external. As its plant or controller, until the run ends."""
+    """Join a run that waits with --external. This process is its plant or controller until the run ends."""
     from haploop.protocol.transport.messages import PROCESSES
     from haploop.protocol.transport.node import take_part
     from haploop.protocol.transport.sockets import SecureContext, Transport
@@ -32,7 +32,7 @@ def join(
     except OSError as error:
         leave(f"{file} cannot be read: {error.strerror}.", WRONG_USE)
     except (ValueError, LookupError, TypeError):
-        leave(f"{file} is none of the files that haploop run --external ROLE writes.", WRONG_USE)
+        leave(f"{file} is not a file that haploop run --external ROLE writes.", WRONG_USE)
     with tempfile.TemporaryDirectory() as own:
         sockets = Path(own if context.transport.host else directory)
         print(f"joining run {told['run']} as its {role}", file=sys.stderr)

@@ -22,7 +22,7 @@ from haploop.tools.command.options import (
 
 @for_a_run
 def status(run: Run = None, json: Json = False) -> None:
-    """Show the live runs and their nodes. Each with its tick, its lag, whom it waits for and what it skipped."""
+    """Show the live runs and their nodes. Each with its tick, its lag, what it waits for and what it skipped."""
     from haploop.launch.processes import run_directory
     from haploop.launch.processes.run_directory import ask
 
@@ -61,7 +61,7 @@ def _ask(run_id: Any, as_json: bool, verb: str, **arguments: Any) -> None:
 
 @for_a_run
 def pause(run: Run = None, json: Json = False) -> None:
-    """Pause at the next tick possible."""
+    """Pause at the next possible tick."""
     _ask(run, json, "pause")
 
 
@@ -91,7 +91,7 @@ def pace(
 
 @for_a_run
 def stop(run: Run = None, json: Json = False) -> None:
-    """End the run in order, with a summary of what ran."""
+    """End the run properly, with a summary of what ran."""
     _ask(run, json, "stop")
 
 
@@ -101,7 +101,7 @@ def swap(
     parameters: Annotated[list[str] | None, typer.Argument(metavar="[KEY=VALUE]...", show_default=False)] = None,
     element: Annotated[int, typer.Option(help="which element; one past the end adds one")] = 0,
     at: float | None = None,
-    reload: Annotated[bool, typer.Option("--reload", help="load the kind's --plugin file anew first")] = False,
+    reload: Annotated[bool, typer.Option("--reload", help="load the kind's --plugin file again first")] = False,
     run: Run = None,
     json: Json = False,
 ) -> None:
@@ -117,7 +117,7 @@ def set_(
     run: Run = None,
     json: Json = False,
 ) -> None:
-    """Change numbers of a running loop. These are wall.stiffness, wall.position, dissipation.0.mass and so on."""
+    """Change numbers of a running loop. For example wall.stiffness, wall.position, dissipation.0.mass."""
     _ask(run, json, "set", set=parse_assignments(parameters), at=at)
 
 
@@ -146,15 +146,15 @@ def attach(
 
 
 def keys(
-    directory: Annotated[Path, typer.Argument(help="new, or one that lacks some", show_default=False)],
+    directory: Annotated[Path, typer.Argument(help="a new directory, or one that lacks some keys", show_default=False)],
 ) -> None:
     """Make the keys for runs that other hosts can reach. A certificate for each process, and one for clients."""
     from haploop.protocol.transport.keys import make_keys
 
     with plain_errors():
         made = make_keys(directory)
-    print(f"{directory} has keys for the {', '.join(made)} now." if made else f"{directory} had all keys already.")
+    print(f"{directory} now has keys for the {', '.join(made)}." if made else f"{directory} already had all keys.")
     print(
-        f"It stays on the host of the run. A host to watch and steer from gets {directory / 'clock.key'} and "
-        f"{directory / 'client.key_secret'} alone, by a way that nobody else can read."
+        f"Keep it on the host of the run. A host that watches and steers gets {directory / 'clock.key'} and "
+        f"{directory / 'client.key_secret'} alone; send them by a way that nobody else can read."
     )

@@ -45,7 +45,7 @@ class RecordedRun:
             stability = {"provisos": [], **summary.get("stability", {})}
             word = "failed" if summary["ended"] == "failed" else told(summary)
             if misfit(stability, {"provisos": [str]}):
-                raise LogError(f"The verdict in {file} is not to be read.")
+                raise LogError(f"The verdict in {file} cannot be read.")
             words = [word, *stability["provisos"], when]
             return cls(name, file.parent, str(summary.get("title") or name), ", ".join(words))
         except (LogError, KeyError, TypeError):  # a foreign file, or one of another version
@@ -123,7 +123,7 @@ class LiveRuns:
         strange = [table.name for table in scene.dissipation if table not in known]
         try:
             if curved := why_not_linear(replace(scene, dissipation=tuple(known))):
-                return f"not linear, by {' and '.join(curved)}"
+                return f"not linear, because of {' and '.join(curved)}"
             if strange:
                 return f"the element {' and '.join(strange)} is not known to this page, which reads no plugin files"
             limit = OneTickMap.from_scene(scene).stiffness_limit()

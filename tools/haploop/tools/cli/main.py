@@ -60,5 +60,5 @@ def _refuse_what_is_no_text(words: list[str]) -> None:
     """Exits with a sentence if an argument is not UTF-8 text, since no file and no message of a run could hold it."""
     for word in words:
         if "\0" in word or (not word.isascii() and any("\ud800" <= letter <= "\udfff" for letter in word)):
-            print(f"Every argument, names of files too, must be UTF-8 text, but {word!r} was given.", file=sys.stderr)
+            print(f"Every argument, file names included, must be UTF-8 text, but {word!r} was given.", file=sys.stderr)
             sys.exit(2)

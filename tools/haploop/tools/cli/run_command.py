@@ -34,31 +34,31 @@ def run(
     scene: SceneFile,
     set: Set = None,
     out: Annotated[Path | None, typer.Option(help="directory to write to, new or empty [runs/SCENE-TIME]")] = None,
-    in_process: Annotated[bool, typer.Option("--in-process", help="everything in one process, same bits")] = False,
+    in_process: Annotated[bool, typer.Option("--in-process", help="all in one process, with the same bits")] = False,
     pace: Annotated[
         str | None, typer.Option(help="free, or simulated seconds per second [free; 1 with --view]", show_default=False)
     ] = None,
     clock: Annotated[
-        str, typer.Option(metavar="run|plant", help="who owns the time; plant: a device that goes on by itself")
+        str, typer.Option(metavar="run|plant", help="who owns the time; plant: a device that runs on its own")
     ] = "run",
-    view: Annotated[bool, typer.Option("--view", help="show it in the browser, which may steer it")] = False,
+    view: Annotated[bool, typer.Option("--view", help="show the run in the browser, where it can be steered")] = False,
     until_closed: UntilClosed = False,
     name: Annotated[
-        str | None, typer.Option(metavar="NAME", help="of the run, in status, summary and figures [the scene's title]")
+        str | None, typer.Option(metavar="NAME", help="run's name in status, summary and figures [the scene's title]")
     ] = None,
     plugin: Plugin = None,
     tcp: Annotated[
-        str | None, typer.Option(metavar="ADDRESS[:PORT]", help="TCP sockets, such as 127.0.0.1; others need keys")
+        str | None, typer.Option(metavar="ADDRESS[:PORT]", help="use TCP, as at 127.0.0.1; other addresses need keys")
     ] = None,
     keys: Annotated[Path | None, typer.Option(metavar="DIR", help="keys for TCP, as haploop keys makes them")] = None,
     node: Annotated[
         list[str] | None,
-        typer.Option("--node", metavar="ROLE=COMMAND", help="a program of yours as plant or controller"),
+        typer.Option("--node", metavar="ROLE=COMMAND", help="your own program as plant or controller"),
     ] = None,
     external: Annotated[
         list[str] | None, typer.Option("--external", metavar="ROLE", help="wait for a program to join in this role")
     ] = None,
-    wait: Annotated[str | None, typer.Option("--wait", metavar="TIME", help="how long for [60 s]")] = None,
+    wait: Annotated[str | None, typer.Option("--wait", metavar="TIME", help="how long to wait for it [60 s]")] = None,
     json: Json = False,
 ) -> None:
     """Run a scene to its end. Other terminals can watch and steer it meanwhile. The last line names its directory."""
@@ -78,13 +78,13 @@ def run(
     with viewing(view, in_process, until_closed) as viewer, plain_errors():
         rate = parse_pace(pace or ("1" if view and clock == "run" else "free"))
         if rate != "free" and in_process:
-            leave("--pace needs the clock of a run as processes; leave out --in-process.", WRONG_USE)
+            leave("--pace needs the clock of a run in separate processes; leave out --in-process.", WRONG_USE)
         if tcp and in_process:
-            leave("--tcp needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
+            leave("--tcp needs the sockets of a run in separate processes; leave out --in-process.", WRONG_USE)
         if clock not in ("run", "plant"):
-            leave(f"--clock is run or plant, but {clock!r} was given.", WRONG_USE)
+            leave(f"--clock must be run or plant, but {clock!r} was given.", WRONG_USE)
         if (node or external or clock == "plant") and in_process:
-            leave("--node, --external and --clock need the processes of a run; leave out --in-process.", WRONG_USE)
+            leave("--node, --external and --clock need a run in separate processes; leave out --in-process.", WRONG_USE)
         if wait is not None and not external:
             leave("--wait is for --external, which was not given.", WRONG_USE)
         try:

@@ -22,7 +22,7 @@ _WORDS = {
     "provisos": ("provisos", ""),
     "ended": ("ended", ""),
     "logged_s": ("log ends at", "s"),
-    "oscillation_m": ("oscillation at its end", "m"),
+    "oscillation_m": ("oscillation at the end", "m"),
     "force_swing_N": ("force, peak to peak", "N"),
     "force_ripple_N": ("force ripple above 30 Hz", "N"),
     "width_m": ("pushed, it swings by", "m"),
@@ -47,9 +47,9 @@ def plot(
     out: Annotated[Path | None, typer.Option(help="the figure's file [in the first directory]")] = None,
     plugin: Plugin = None,
 ) -> None:
-    """Draw a run, several over one another, or a sweep's map.
+    """Draw a run, several runs overlaid, or a sweep's map.
 
-    A run that was killed is drawn up to the end of its log, an unfinished sweep as far as it has come. The last line
+    A run that was killed is drawn up to the end of its log, an unfinished sweep as far as it got. The last line
     names the figure's file.
     """
     from haploop.tools.draw import draw_any
@@ -66,7 +66,7 @@ def plot(
 
 
 def diff(first: Directory, second: Directory, json: Json = False) -> None:
-    """Say what two runs differ in, and at which tick they part."""
+    """Say how two runs differ, and at which tick they part."""
     from haploop.tools.figure.data import FigureError
     from haploop.tools.figure.difference import difference_of
     from haploop.tools.render.terminal import console

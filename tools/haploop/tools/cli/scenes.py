@@ -48,7 +48,7 @@ def check(
     schema: Annotated[bool, typer.Option("--schema", help="print the JSON Schema of scenes instead")] = False,
     json: Json = False,
 ) -> None:
-    """Report what is wrong with a scene, or can hardly be meant."""
+    """Report what is wrong or probably unintended in a scene."""
     from haploop.launch.plan.effects import notes
     from haploop.launch.scene.file import load
     from haploop.launch.scene.mistakes import SceneError
@@ -78,17 +78,17 @@ def check(
             for name in ("time", "force"):
                 force[name] = f"{len(force[name])} numbers from {min(force[name]):g} to {max(force[name]):g}"
         print(to_toml(tables), end="", flush=True)
-        with_a = " with a plant of yours (--node plant=COMMAND)" if hand_is_unmodelled(resolved) else ""
+        with_a = " with your own plant (--node plant=COMMAND)" if hand_is_unmodelled(resolved) else ""
         no_wall = "" if resolved.wall else " It has no [wall]: nothing pushes the device back."
         if notes(resolved, kinds):
             print(file=sys.stderr)  # sets the notes apart from all that is above
         noted = print_notes(resolved, kinds, scene, set or [])
-        but = " But see above what it can hardly mean." if noted else ""
+        but = " But see above what is probably unintended." if noted else ""
         print(f"{scene} can be run{with_a}.{no_wall}{but}", file=sys.stderr)
 
 
 def plugins(plugin: Plugin = None, json: Json = False) -> None:
-    """List the elements, and what else a file brings, with parameters."""
+    """List elements, and what else a plugin adds, with parameters."""
     from haploop.protocol.installed import all_brought
 
     with plain_errors():
@@ -169,10 +169,10 @@ def export(
     directory: Annotated[Path, typer.Argument(help="directory of a run, or its log", show_default=False)],
     to: Annotated[str, typer.Option(help="csv, npz, parquet or json-mcap (for Foxglove)", show_default=False)],
     out: Annotated[
-        Path | None, typer.Option(help="directory (csv, parquet: a file a channel) or file [beside the log]")
+        Path | None, typer.Option(help="directory (csv, parquet: one file per channel) or file [beside the log]")
     ] = None,
     topics: Annotated[str | None, typer.Option(help="only these channels, comma-separated [all]")] = None,
-    force: Annotated[bool, typer.Option("--force", help="write over files that exist")] = False,
+    force: Annotated[bool, typer.Option("--force", help="overwrite existing files")] = False,
 ) -> None:
     """Write a run's log in a format for other programs. Names and units are kept; stdout names the files.
 

@@ -14,9 +14,9 @@ def sweep(
     sweep: SweepFile,
     set: Set = None,
     out: Annotated[
-        Path | None, typer.Option(help="directory; one that holds this sweep goes on [runs/SWEEP-TIME]")
+        Path | None, typer.Option(help="directory; one that holds this sweep is continued [runs/SWEEP-TIME]")
     ] = None,
-    workers: Annotated[int | None, typer.Option(help="processes [one a core]", show_default=False)] = None,
+    workers: Annotated[int | None, typer.Option(help="processes [one per core]", show_default=False)] = None,
     dask: Annotated[str | None, typer.Option(metavar="ADDRESS", help="scheduler of a Dask cluster to run on")] = None,
     jax: Annotated[bool, typer.Option("--jax", help="run compiled, on CPU or GPU, within a tolerance")] = False,
     plugin: Plugin = None,
@@ -40,25 +40,29 @@ def dissipate(
         list[str] | None, typer.Option(metavar="ELEMENT", help='any other: "KIND KEY=VALUE ..."')
     ] = None,
     position: Annotated[
-        str | None, typer.Option(metavar="COLUMN", help="name or number from 1 [x or position]")
+        str | None, typer.Option(metavar="COLUMN", help="column of the position, name or number from 1 [x or position]")
     ] = None,
-    time: Annotated[str | None, typer.Option(metavar="COLUMN", help="of the time [t, time or timestamp]")] = None,
-    rate: Annotated[float | None, typer.Option(min=1e-6, max=1e9, help="samples a second, in place of times")] = None,
+    time: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="column of the time [t, time or timestamp]")
+    ] = None,
+    rate: Annotated[float | None, typer.Option(min=1e-6, max=1e9, help="samples per second, in place of times")] = None,
     velocity: Annotated[str | None, typer.Option(metavar="COLUMN", help="recorded, not estimated")] = None,
     acceleration: Annotated[str | None, typer.Option(metavar="COLUMN", help="recorded, not estimated")] = None,
     force: Annotated[
-        str | None, typer.Option(metavar="COLUMN", help="on the device, commanded: its work, and the sum F v T")
+        str | None, typer.Option(metavar="COLUMN", help="commanded force on the device: its work, and the sum F v T")
     ] = None,
     unit: Annotated[
-        str | None, typer.Option(help="of the position, such as mm, or metres a count [the header's (unit), m]")
+        str | None, typer.Option(help="of the position, such as mm, or metres per count [the header's (unit), m]")
     ] = None,
     time_unit: Annotated[str | None, typer.Option(help="such as ms [the header's (unit), s]")] = None,
     velocity_unit: Annotated[str | None, typer.Option(help="such as mm/s [the header's (unit), m/s]")] = None,
     acceleration_unit: Annotated[str | None, typer.Option(help="such as g_0 [the header's (unit), m/s^2]")] = None,
     force_unit: Annotated[str | None, typer.Option(help="such as mN [the header's (unit), N]")] = None,
-    wall: Annotated[str | None, typer.Option(metavar="POSITION", help="elements act beyond it only, m or text")] = None,
+    wall: Annotated[str | None, typer.Option(metavar="POSITION", help="elements act only beyond it, m or text")] = None,
     occupies: Annotated[str, typer.Option(metavar="below|above", help="which side of it the wall is")] = "below",
-    delay: Annotated[str | None, typer.Option(metavar="TIME", help="age of a force as it acts [0; a run's]")] = None,
+    delay: Annotated[
+        str | None, typer.Option(metavar="TIME", help="age of a force when it acts [0; that of a run]")
+    ] = None,
     set: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="velocity.cutoff, acceleration.estimator ...")
     ] = None,
@@ -68,8 +72,8 @@ def dissipate(
 ) -> None:
     """Compute what elements would have dissipated on a recording. They do not change its motion.
 
-    If a force was recorded too: its true work, held from sample to sample, and whether it is passive. One pass in
-    constant memory. The last line names the figure's file.
+    If a force was recorded, too: its true work, held from sample to sample, and whether it is passive. The recording
+    is read once, in constant memory. The last line names the figure's file.
     """
     from haploop.tools.dissipate.command import Request, Selection
     from haploop.tools.dissipate.command import dissipate as book
@@ -84,13 +88,13 @@ def dissipate(
 def paper(
     figure: Annotated[list[int] | None, typer.Option(help="number of a figure; may be repeated [all]")] = None,
     out: Annotated[Path, typer.Option(help="directory for pictures, data, scenes and the page")] = Path("runs/paper"),
-    small: Annotated[bool, typer.Option("--small", help="few runs, in seconds, to see that it works")] = False,
-    workers: Annotated[int | None, typer.Option(min=1, help="processes [one a core]")] = None,
+    small: Annotated[bool, typer.Option("--small", help="few runs, done in seconds, to see that it works")] = False,
+    workers: Annotated[int | None, typer.Option(min=1, help="processes [one per core]")] = None,
 ) -> None:
     """Make the figures of the paper and the table of its claims.
 
     Each figure is a PNG with its data and scenes beside it. The last line names the page. After a stop, the same
-    command continues where it was.
+    command continues where it stopped.
     """
     from haploop.tools.studies.choi2022.command import paper as make
 
@@ -104,17 +108,17 @@ def advise(
     estimator: Estimator = None,
     set: Set = None,
     plugin: Plugin = None,
-    workers: Annotated[int | None, typer.Option(help="processes [as many as cores]", show_default=False)] = None,
+    workers: Annotated[int | None, typer.Option(help="processes [one per core]", show_default=False)] = None,
     out: Annotated[
-        Path | None, typer.Option(help="directory; one of an advice that was stopped goes on [runs/advice-DEVICE-TIME]")
+        Path | None, typer.Option(help="directory; that of a stopped advice is continued [runs/advice-DEVICE-TIME]")
     ] = None,
     json: Json = False,
 ) -> None:
     """Say how stiff a wall a device can render safely.
 
-    With which element, what breaks it, and which change would gain most.
+    Also with which element, what breaks it, and which change would gain most.
 
-    It can be stopped; the same command with --out DIR, the directory of the first, continues it.
+    It can be stopped; the same command with --out DIR, the directory of the stopped one, continues it.
     """
     from haploop.tools.advise.command import advise as give
 

@@ -28,7 +28,7 @@ _AT = "The page is at {} ({} ends it)"
 _ENDS = ("Ctrl-C", "closing it")
 _STAYS = "The run is over; its page {} until {}."
 _UNTIL = ("Ctrl-C ends it here", "it is closed, or Ctrl-C ends it here")
-_GONE = "The page is gone; the run goes on. Where it stands still, haploop resume lets it go on, Ctrl-C ends it."
+_GONE = "The page is gone; the run continues. If it stands still, haploop resume continues it, Ctrl-C ends it."
 # How long a run waits for its viewer.
 _HELD_S = 10.0
 # A viewer yields the processor to a run.
@@ -39,12 +39,14 @@ _NICE = 10
 def view(
     run: Annotated[str | None, typer.Option("--run", metavar="ID", help="which run to show first [the newest]")] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, metavar="PORT", help="of this machine; 0: any free one")] = 0,
-    since: Annotated[str, typer.Option(metavar="start|now", help="with what was logged before, or without")] = "start",
+    since: Annotated[
+        str, typer.Option(metavar="start|now", help="start: also show what was logged before; now: do not")
+    ] = "start",
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page")] = True,
     until_closed: UntilClosed = False,
     led: Annotated[bool, typer.Option("--led", hidden=True)] = False,
 ) -> None:
-    """Show runs in the browser as they go, and steer them. Those of this machine or one elsewhere, until Ctrl-C."""
+    """Show runs in the browser as they go, and steer them. The runs of this machine, or one elsewhere, until Ctrl-C."""
     # With --led, another process started this one: it reads the link on stdout, and closing stdin ends the viewer.
     if since not in SINCE:
         leave(f"--since must be {' or '.join(SINCE)}, but {since!r} was given.", WRONG_USE)
@@ -129,7 +131,7 @@ def viewing(wanted: bool, in_process: bool, until_closed: bool) -> Iterator[View
     The viewer is a process of its own, and the run does not depend on it.
     """
     if wanted and in_process:
-        leave("--view needs the sockets of a run as processes; leave out --in-process.", WRONG_USE)
+        leave("--view needs the sockets of a run in separate processes; leave out --in-process.", WRONG_USE)
     if until_closed and not wanted:
         leave("--until-closed is for the page of --view, which was not given.", WRONG_USE)
     if wanted:
@@ -154,7 +156,7 @@ class Viewer:
         if not self._wanted:
             return
         words = ["view", "--run", run_id.partition(" ")[0], "--led", *["--until-closed"] * self._until_closed]
-        print("The page is on its way; its address comes in a few seconds.", file=sys.stderr, flush=True)
+        print("The page is starting; its address follows in a few seconds.", file=sys.stderr, flush=True)
         self._since = time.monotonic()
         self._process = subprocess.Popen(
             [sys.executable, "-m", "haploop.tools.cli", *words],
@@ -188,7 +190,7 @@ class Viewer:
             return
         with contextlib.suppress(KeyboardInterrupt):
             if process.poll() is None:
-                where = f"stays at {self._link}" if self._link else "is on its way and stays"
+                where = f"stays at {self._link}" if self._link else "is starting and stays"
                 print(_STAYS.format(where, _UNTIL[self._until_closed]), file=sys.stderr, flush=True)
             process.wait()
         assert process.stdin

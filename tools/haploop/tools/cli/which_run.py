@@ -13,9 +13,9 @@ import typer
 
 from haploop.tools.command.options import WRONG_USE, leave, parse_seconds
 
-_ADDRESS = "a run elsewhere, HOST:PORT as haploop run --tcp said"
-_TIME = 'simulated time of the change, s or "1500 ms", at once without; or '
-_KEYS = typer.Option("--keys", metavar="DIR", help="with --at: clock.key and client.key_secret of its keys")
+_ADDRESS = "a run elsewhere, HOST:PORT as printed by haploop run --tcp"
+_TIME = 'simulated time of the change, s or "1500 ms" [at once]; or '
+_KEYS = typer.Option("--keys", metavar="DIR", help="with --at: directory with its clock.key and client.key_secret")
 
 
 def for_a_run(command: Callable[..., None]) -> Callable[..., None]:

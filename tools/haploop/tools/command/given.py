@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from haploop.protocol.scene.scene import Scene
 
 _OWN = "haploop.controller."
-_IN_PLACE = "Note: the element {0} is that of a plugin, in place of the installed one."
+_IN_PLACE = "Note: the element {0} comes from a plugin, in place of the installed one."
 
 
 def kinds_with(plugins: list[Path]) -> dict[str, type[Element]]:

@@ -28,7 +28,7 @@ def complete(folder: str) -> Callable[[str], list[str]]:
     return completed
 
 
-_INSTEAD = "Note: {0} is your own {1}, taken in place of the one that comes with haploop."
+_INSTEAD = "Note: {0} is your own {1}, used in place of the one that comes with haploop."
 
 
 def told(folder: str) -> Callable[[Any], Any]:
@@ -79,7 +79,7 @@ Plugin = Annotated[
     list[Path] | None,
     typer.Option("--plugin", metavar="FILE", help="Python file with elements, walls, estimators or hand forces"),
 ]
-Run = Annotated[str | None, typer.Option("--run", metavar="ID", help="which run, when several are live")]
+Run = Annotated[str | None, typer.Option("--run", metavar="ID", help="which run, if several are live")]
 Json = Annotated[bool, typer.Option("--json", help="one JSON object on stdout")]
 
 
@@ -113,7 +113,7 @@ def parse_ticks(text: str) -> int:
     try:
         return int(text)
     except ValueError:
-        leave(f"A step goes on for a whole number of ticks, such as 100, but {text[:40]!r} was given.", WRONG_USE)
+        leave(f"A step lasts a whole number of ticks, such as 100, but {text[:40]!r} was given.", WRONG_USE)
 
 
 def parse_seconds(text: str | None, option: str = "--at") -> float | None:
