@@ -96,7 +96,7 @@ def test_a_buzz_that_pauses_is_told_with_all_its_stretches_also_those_that_do_no
     assert "31.0 Hz (give or take 1 Hz)" in said
     assert "3 times between about 0.0 s and 9.0 s, " in said
     assert "run haploop advise FILE" in said
-    assert "pauses of less than half a second are not told" in said
+    assert "pauses of less than half a second are not reported" in said
 
 
 def test_a_gap_in_a_recording_does_not_end_its_buzz() -> None:

@@ -29,7 +29,7 @@ def test_the_buzz_is_the_first_thing_said_also_without_an_element(recording: Pat
     result = CliRunner().invoke(app, ["dissipate", str(recording)])
     assert result.exit_code == 0, result.output
     assert result.stdout.startswith(said)
-    assert "what each element at hand would have taken" in result.stdout
+    assert "what each available element would have taken" in result.stdout
     assert result.stdout.index("damping") < result.stdout.index("--damping 2.7")
     data = json.loads(CliRunner().invoke(app, ["dissipate", str(recording), "--json"]).stdout)
     assert (data["buzz_word"], data["elements"]) == ("buzzes", [])
@@ -94,7 +94,9 @@ def test_the_advised_low_pass_leaves_the_swing_of_the_motion_in(recording: Path,
     notes = note_sentences(outcome(recording, masses=["0.01"]))
     assert any("acceleration.cutoff=93 or --set velocity.cutoff=93" in sentence for sentence in notes)
     fast = write(tmp_path / "fast.csv", {"t": S, "x": counted(swing(180.0, 1e-4))})
-    assert any("No low-pass of the estimates suits" in each for each in note_sentences(outcome(fast, masses=["0.01"])))
+    assert any(
+        "No low-pass of the estimates is suitable" in each for each in note_sentences(outcome(fast, masses=["0.01"]))
+    )
 
 
 @pytest.mark.parametrize(("cutoff", "is_told"), [("20", True), ("30", True), ("93", False)])

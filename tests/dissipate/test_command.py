@@ -205,11 +205,11 @@ def test_the_answer_says_who_takes_most_and_who_feeds(tmp_path: Path) -> None:
     fast = write(tmp_path / "fast.csv", {"t": T, "x": 2e-5 * np.sin(2.0 * np.pi * 400.0 * T)})
     assert conclusion(outcome(slow, dampings=["2.7"])).startswith("damping 2.7 N s/m would have dissipated")
     fed = conclusion(outcome(fast, dampings=["2.7"]))
-    assert fed.startswith("none of these would have dissipated; all would have fed the motion. Not to be relied on")
+    assert fed.startswith("none of these would have dissipated; all would have fed the motion. Not reliable")
     untouched = outcome(slow, dampings=["2.7"], wall="-20 mm")
-    apart = "it lies from −2.00 mm to 2.00 mm, and the wall below −20.0 mm."
+    apart = "it stays between −2.00 mm and 2.00 mm, and the wall is below −20.0 mm."
     assert conclusion(untouched) == f"none of these would have given a force on this motion: {apart}"
-    assert any("in contact with the wall only" in sentence for sentence in note_sentences(untouched))
+    assert any("only in contact with the wall" in sentence for sentence in note_sentences(untouched))
     both = conclusion(outcome(slow, dampings=["2.7", "1.35"]))
     assert "2.00 times as much as damping 1.35 N s/m" in both
 

@@ -28,7 +28,7 @@ from helpers.shown import shown
 S: Floats = np.arange(4000.0) * 1e-3
 K, SWING_M, SWING_HZ, DEEP_M = 1000.0, 1e-4, 37.0, 2e-3
 W = 2.0 * np.pi * SWING_HZ
-HIDES, FEEDS, TAKES = "not over the buzz", "it feeds it", "something else feeds it"
+HIDES, FEEDS, TAKES = "not over the buzz", "it feeds the swing", "something else feeds it"
 
 
 def pressed(t: Floats, counts_m: float = 0.0) -> Floats:
@@ -135,7 +135,7 @@ def test_a_force_that_pushes_back_feeds_the_swing_whatever_it_gave_before_and_on
         assert found.force.pushes_back is pushes_back
         said = shown(make_report(found), 400)
         assert word in said
-        assert ("recorded with the other sign (then --force-unit -1)" in said) is not pushes_back
+        assert ("recorded with the opposite sign (then --force-unit -1)" in said) is not pushes_back
         assert TAKES not in said
 
 

@@ -48,7 +48,7 @@ def test_a_unit_in_the_header_stands_before_one_in_a_row_of_units(plain: Path, t
 def test_lines_of_a_title_are_counted_and_told(tmp_path: Path) -> None:
     path = recorded(tmp_path, "bench of Monday", "run of a wall", "t,x", "ms,mm")
     assert DelimitedFile(path).title == 2
-    assert outcome(path, dampings=["1.0"]).recording.notes.remarks == ["Lines above the header, taken for a title: 2."]
+    assert outcome(path, dampings=["1.0"]).recording.notes.remarks == ["Lines above the header, taken as a title: 2."]
 
 
 @pytest.mark.parametrize("cell", ["", "NA", "-", "null"])

@@ -23,7 +23,7 @@ def test_energy_that_comes_of_noise_in_the_positions_is_not_told_as_that_of_the_
     found = outcome(write(tmp_path / "slow.csv", {"t": t, "x": x}), dampings=["3"], masses=["0.01"])
     damper, *inertias = found.elements
     assert [each.is_fast for each in found.elements] == [False, is_told, is_told]
-    assert ("Not to be relied on" in conclusion(found)) == is_told
+    assert ("Not reliable" in conclusion(found)) == is_told
     assert any("noise of the estimates" in sentence for sentence in note_sentences(found)) == is_told
     # The damper's energy stays what it was, which is b v^2 over the way; an inertia's is another altogether.
     assert damper.true_J == pytest.approx(3.0 * (3e-3 * 2.0 * np.pi * 3.0) ** 2 / 2.0 * 2.0, rel=0.03)
@@ -57,7 +57,7 @@ def test_what_white_noise_made_of_the_energy_of_damping_is_told_within_a_third(
     assert damper.noisier_J is not None
     assert damper.noisier_J - damper.true_J == pytest.approx(damper.true_J - true_J, rel=1 / 3)
     assert damper.is_moved_by_noise
-    assert "Not to be relied on" in conclusion(found)
+    assert "Not reliable" in conclusion(found)
     assert any(f"from {amount(damper.true_J, 'J')} to" in sentence for sentence in note_sentences(found))
 
 
@@ -75,7 +75,7 @@ def test_counts_that_hide_a_slow_motion_from_damping_are_told(tmp_path: Path, st
 def test_a_motion_whose_noise_changes_little_is_relied_on(tmp_path: Path, x: np.ndarray) -> None:
     found = damped(tmp_path / "fine.csv", x)
     assert not found.elements[0].is_moved_by_noise
-    assert "Not to be relied on" not in conclusion(found)
+    assert "Not reliable" not in conclusion(found)
 
 
 def test_recorded_rates_leave_open_what_noise_of_the_positions_made(tmp_path: Path) -> None:

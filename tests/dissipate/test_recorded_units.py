@@ -63,14 +63,14 @@ def test_times_far_apart_without_a_unit_are_asked_after(tmp_path: Path, name: st
 def test_positions_too_far_apart_for_metres_are_asked_after_unless_a_unit_says_so(tmp_path: Path) -> None:
     columns = {"t": T, "position": X / np.ptp(X)}
     path = write(tmp_path / "mm.csv", {**columns, "position": 4.0 * columns["position"]})
-    with pytest.raises(RecordingError, match=r"metres, millimetres or counts\? Give --unit m, mm or metres a count"):
+    with pytest.raises(RecordingError, match=r"metres, millimetres or counts\? Give --unit m, mm or metres per count"):
         outcome(path, dampings=["1.0"])
     for unit in ("mm", "0.001"):
         assert not outcome(path, layout=Layout(length=unit), dampings=["1.0"]).recording.notes.remarks
     doubtful = write(tmp_path / "doubtful.csv", {**columns, "position": 0.5 * columns["position"]})
-    assert any("taken for metres, 0.5 m" in words for words in note_sentences(outcome(doubtful, dampings=["1.0"])))
+    assert any("taken as metres, 0.5 m" in words for words in note_sentences(outcome(doubtful, dampings=["1.0"])))
     named = write(tmp_path / "named.csv", {"t": T, "x_m": 0.5 * columns["position"]})
-    assert not any("taken for metres" in words for words in note_sentences(outcome(named, dampings=["1.0"])))
+    assert not any("taken as metres" in words for words in note_sentences(outcome(named, dampings=["1.0"])))
 
 
 F = 4.0 * np.sin(2.0 * np.pi * 15.0 * T)
@@ -99,7 +99,7 @@ def test_a_unit_that_makes_of_the_numbers_what_no_device_does_is_asked_after(
     assert len(remarks) == len(hardly), remarks
     for words, remark in zip(hardly, remarks, strict=True):
         assert words in remark
-        assert remark.startswith("Can that be meant")
+        assert remark.startswith("Can this be right")
 
 
 def test_a_unit_of_recorded_rates_is_asked_after_too(tmp_path: Path) -> None:
@@ -111,7 +111,9 @@ def test_a_unit_of_recorded_rates_is_asked_after_too(tmp_path: Path) -> None:
 
 def test_counts_are_asked_what_one_of_them_is_and_it_may_have_a_unit(tmp_path: Path) -> None:
     path = write(tmp_path / "counts.csv", {"t (s)": T, "pos [counts]": X / 11e-6})
-    with pytest.raises(RecordingError, match='Give --unit: a unit, or m a count, as a number or text such as "11 um"'):
+    with pytest.raises(
+        RecordingError, match='Give --unit: a unit, or m per count, as a number or text such as "11 um"'
+    ):
         outcome(path, dampings=["1"])
     with pytest.raises(RecordingError, match="A unit cannot be 0 m"):
         outcome(path, dampings=["1"], layout=Layout(length="0 um"))
@@ -129,6 +131,6 @@ def test_a_mass_that_may_be_in_grams_is_asked_after(plain: Path) -> None:
 
 def test_what_cannot_be_meant_is_said_before_anything_else(tmp_path: Path) -> None:
     doubtful = outcome(write(tmp_path / "metres.csv", {"t (s)": T, "x (m)": 1e3 * X}), dampings=["1.0"])
-    assert shown(make_report(doubtful), 200).startswith("Can that be meant: a device that moves 4.00 m in all?")
+    assert shown(make_report(doubtful), 200).startswith("Can this be right: a device that moves 4.00 m in all?")
     meant = outcome(write(tmp_path / "mm.csv", {"t (s)": T, "x (mm)": 1e3 * X}), dampings=["1.0"])
     assert shown(make_report(meant), 200).splitlines()[1].startswith("mm.csv: damping")

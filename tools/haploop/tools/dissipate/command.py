@@ -65,8 +65,8 @@ class Selection:
             table = (key_path(text.partition("=")[0]) or [text])[0]
             if table not in _ESTIMATES:
                 raise RecordingError(
-                    f"--set {text} has no meaning here: a recorded motion stays as it is. "
-                    "What can be set are keys of [velocity], [acceleration] and [encoder]."
+                    f"--set {text} has no meaning here: a recorded motion does not change. "
+                    "Only keys of [velocity], [acceleration] and [encoder] can be set."
                 )
             found.add(table)
         return frozenset(found)
@@ -122,8 +122,8 @@ def compute_outcome(request: Request, kinds: dict[str, type[Element]]) -> Outcom
     for kind in (table.name for table in scene.dissipation):
         if set(kinds[kind].asks) - {"way"}:
             raise RecordingError(
-                f"The element {kind} answers to forces and energies of its loop, which a recorded motion has not; with "
-                "them it would have moved otherwise. Run it in a scene: haploop run."
+                f"The element {kind} depends on forces and energies of its loop, which a recorded motion does not "
+                "have; with them the motion would have been different. Run it in a scene: haploop run."
             )
     makings = scene, recording.period_s, recording.delay_s, kinds, recording.recorded, recording.has_force
     booking, noisier = Booking(*makings), Booking(*makings)

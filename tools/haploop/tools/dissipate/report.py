@@ -22,57 +22,57 @@ _PASSIVITY: dict[Passivity, str] = {
     ),
     "generated": "it gave out up to {excess} more than it had taken: not passive",
     "other sign": (
-        "it gave out up to {excess} and took next to nothing before: not passive, or recorded with the other sign "
-        "(then --force-unit -1)"
+        "it gave out up to {excess} and took next to nothing before: not passive, or recorded with the opposite "
+        "sign (then --force-unit -1)"
     ),
     "unresolved": (
-        "it gave out up to {excess} more than it had taken, as rounded positions alone can: "
+        "it gave out up to {excess} more than it had taken, which rounded positions alone can cause: "
         "whether it is passive cannot be said"
     ),
     "begins loaded": (
-        "it is at work where the recording, or a part after a gap, begins, so energy may have been stored before: "
+        "it already acts where the recording, or a part after a gap, begins, so energy may have been stored before: "
         "whether it is passive cannot be said"
     ),
 }
 _PULLS = (
-    "The recorded force pulls the device the further in, the further in it is. That of a wall or a spring pushes back, "
-    "so of one of these it was recorded with the other sign (then --force-unit -1)."
+    "The further in the device is, the more the recorded force pulls it in. A wall or a spring pushes back, so if the "
+    "force is that of one of these, it was recorded with the opposite sign (then --force-unit -1)."
 )
 _NAIVE = (
-    "This is true of a force that is positive along the position and held to the next sample; that of a sensor, or of "
-    "a thinned-out recording, is not. What is taken out of the device counts as positive. The sum F v T, v that at the "
-    "sample (sampled books take the way after it), would say that the force {naive}: off by {off}{share}."
+    "This holds for a force that is positive along the position and held to the next sample; that of a sensor, or of a "
+    "thinned-out recording, is not. Energy taken out of the device counts as positive. The sum F v T, with v at the "
+    "sample (sampled books use the displacement after it), would say that the force {naive}: off by {off}{share}."
 )
 _NOISY_POSITIONS = (
-    "The positions have noise of about {noise}, as their fastest changes tell. As much again would change the energy "
-    "of {elements}; the noise that is in them has changed it by about as much."
+    "The positions have noise of about {noise}, judging by their fastest changes. As much noise again would change the "
+    "energy of {elements}; the noise already in them has changed it by about as much."
 )
 _FAST_FORCE = (
-    "{elements} is faster than a quarter of the sampling rate. Unless the device buzzed as fast, that is noise of the "
-    "estimates, and so may be much of the energy."
+    "{elements} is faster than a quarter of the sampling rate. Unless the device buzzed that fast, this is noise of "
+    "the estimates, and much of the energy may be noise, too."
 )
-_NAME = "--damping 2.7, --mass 0.0018, or --element KIND KEY=VALUE in quotes, or which column is a force with --force."
-_NO_ELEMENT = f"no element was named, and none of those at hand gives a force on this motion. Say which, {_NAME}"
-_AT_HAND = "what each element at hand would have taken, at a size of the same largest force."
-_OTHERS = f"Others, or other sizes, are booked where they are named: {_NAME}"
+_NAME = "--damping 2.7, --mass 0.0018 or --element KIND KEY=VALUE in quotes, or a column of forces with --force."
+_NO_ELEMENT = f"no element was named, and none of those available gives a force on this motion. Name one with {_NAME}"
+_AT_HAND = "what each available element would have taken, at a size with the same largest force."
+_OTHERS = f"To book others, or other sizes, name them with {_NAME}"
 _NO_FORCE = "none of these would have given a force on this motion"
-_BESIDE_WALL = "{none}: it lies from {low} to {high}, and the wall {occupies} {wall}."
+_BESIDE_WALL = "{none}: it stays between {low} and {high}, and the wall is {occupies} {wall}."
 # An inertia above this, kg, was more often meant in grams: the heaviest device that comes with haploop has 0.2 kg.
 _HEAVY_KG = 0.5
 _HEAVY = '{label}: a mass without a unit is in kg; is that what was meant? 1.8 g is --mass "1.8 g" or --mass 0.0018.'
 # Counts of the notes, and what each of them means.
 _COUNTS = {
-    "gaps": "Gaps: {count}, {missing} in all; what happened there is not booked, and estimates begin anew after.",
+    "gaps": "Gaps: {count}, {missing} in all; what happened there is not booked, and estimates start again after each.",
     "unusable_rows": "Rows left out, since a number in them is missing or not finite: {count}.",
     "bridged": "Single missing samples, taken as the mean of their neighbours: {count}.",
     "repeated": (
-        "Samples that repeat the one before in mid-motion, at even intervals: {count} ({percent:.2g} %), as where a "
+        "Samples that repeat the one before in mid-motion, at even intervals: {count} ({percent:.2g} %), as when a "
         "sensor is read faster than it measures. Each looks like a stop and a jump, in which an inertia seems to "
         "generate energy."
     ),
     "uneven": (
-        "Periods more than a tenth off the others: {count}. Estimates take them for equal, as a controller does "
-        "that counts its ticks."
+        "Periods more than a tenth off the others: {count}. Estimates treat them as equal, as a controller that "
+        "counts its ticks does."
     ),
 }
 
@@ -125,7 +125,7 @@ def conclusion(outcome: Outcome) -> str:
 
     words = _energies(outcome.elements)
     if noisy := [element.label for element in outcome.elements if element.is_fast or element.is_moved_by_noise]:
-        words += f". Not to be relied on, since much of it or of its force is noise: {', '.join(noisy)}"
+        words += f". Not reliable, since much of the energy or of the force is noise: {', '.join(noisy)}"
     return f"{words}."
 
 
@@ -154,17 +154,17 @@ def _times(best: ElementOutcome, other: ElementOutcome) -> str:
     return "as much as" if ratio < 1.005 else f"{fixed(ratio)} times as much as" if ratio < 1e4 else "far more than"
 
 
-_ROUNDED = "The times are rounded to {step}: even samples at {rate:.6g} Hz fit them, and are taken."
+_ROUNDED = "The times are rounded to {step}: even samples at {rate:.6g} Hz fit them and are assumed."
 _MAY_BE_WRONG = (
     "Energies and rate may be wrong: {percent:.0f} % of the periods are more than a tenth off the others, and all are "
-    "taken for equal. Where the samples were even, give their rate (--rate)."
+    "treated as equal. If the samples were even, give their rate (--rate)."
 )
 _EQUAL = (
-    "Each element at the size whose largest force on this motion is {equal}; energies are in proportion to sizes. Fast "
-    "is what of its force is faster than a quarter of the sampling rate: noise, unless the device buzzed as fast."
+    "Each element at the size whose largest force on this motion is {equal}; energies are proportional to sizes. Fast "
+    "is the part of its force above a quarter of the sampling rate: noise, unless the device buzzed that fast."
 )
-_SIZES = "Each element is tried at the size given here alone; at another it takes another amount."
-_IN_CONTACT = "Elements act in contact with the wall only; one with acts=always would everywhere."
+_SIZES = "Each element is tried only at the size given here; at another it takes another amount."
+_IN_CONTACT = "Elements act only in contact with the wall; one with acts=always would act everywhere."
 
 
 def note_sentences(outcome: Outcome) -> list[str]:

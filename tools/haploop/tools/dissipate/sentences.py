@@ -15,7 +15,7 @@ from haploop.tools.render.units import amount
 
 _BUZZ: dict[Word, str] = {
     "buzzes": "The recording buzzes: it swings at {frequency}, {width} peak to peak at most, {when}; "
-    "pauses of less than half a second are not told.",
+    "pauses of less than half a second are not reported.",
     "buzzes at several frequencies": (
         "The recording buzzes at several frequencies at once: {lines} peak to peak at most, together up to {width}, "
         "{when}."
@@ -25,7 +25,7 @@ _BUZZ: dict[Word, str] = {
         "and is wide enough to be felt. Motion without a frequency is not called a buzz."
     ),
     "cannot say": (
-        "Whether the recording buzzes cannot be said: that takes {lasts:g} s without a gap, and {rate:g} samples a "
+        "Whether the recording buzzes cannot be said: that takes {lasts:g} s without a gap, and {rate:g} samples per "
         "second."
     ),
 }
@@ -36,14 +36,15 @@ _SHORT = (
 _LEAST_SHORT_S = 0.1
 _HIDDEN = (
     "Whether the recording buzzes cannot be said: a swing at {at:.1f} Hz, {width} peak to peak, would be felt, but it "
-    "is within {counts} counts of the positions, {count} each, as their staircase may be. Record with a finer encoder."
+    "is within {counts} counts of the positions, {count} each, so it may be their staircase. Record with a finer "
+    "encoder."
 )
 _ONE_HZ, _MOVING_HZ = "{0:.1f} Hz (give or take {1:g} Hz)", "{0:.0f} to {1:.0f} Hz"
 # Up to this many spans with different frequencies are described one by one.
 MOST_SPANS = 4
 _SPAN = "{frequency} ({width}) from about {from_s:.1f} s to {to_s:.1f} s"
 _LINE = "{0:.1f} Hz, {1}"
-_NOT_FED = " What a recorded force gives to a swing is told of one at one frequency alone."
+_NOT_FED = " What a recorded force gives to a swing is reported only for one at a single frequency."
 _ONCE, _AGAIN = "from about {0:.1f} s to {1:.1f} s", "{0} times between about {1:.1f} s and {2:.1f} s, {3:.1f} s in all"
 _COURSE: dict[Course, str] = {
     "grew": " It grew from {first} to {last}.",
@@ -51,43 +52,46 @@ _COURSE: dict[Course, str] = {
     "stayed": " It stayed as wide.",
     "varied": " Its width varied from {least} to {widest}.",
 }
-_FED = " Meanwhile the recorded force gave {energy} to this swing, {power}: it feeds it."
+_FED = " Meanwhile the recorded force gave {energy} to this swing, {power}: it feeds the swing."
 _TAKEN = (
     " Meanwhile the recorded force took {energy} out of this swing, {power}: something else feeds it, unless the force "
-    "came later than was said (--delay)."
+    "came later than stated (--delay)."
 )
 _EITHER = (
     " Meanwhile the recorded force moved {energy} between itself and this swing, {power}; which way depends on its "
     "sign, which is in doubt."
 )
-_NEITHER = " The recorded force neither fed this swing nor took from it, but for a hundredth of what went to and fro."
+_NEITHER = (
+    " The recorded force neither fed this swing nor took from it, within a hundredth of the energy that went to and "
+    "fro."
+)
 _SLOWER = (
     " It {also}swings at {frequency}, {width} peak to peak at most, {when}: slower than the {above:g} Hz from which "
-    "on it is called a buzz; a hand's own motion, its tremor or a slow limit cycle, which a recording alone cannot "
-    "tell apart."
+    "on it would be called a buzz. It may be a hand's own motion, its tremor or a slow limit cycle, which a recording "
+    "alone cannot tell apart."
 )
 _FAST = (
     " It moves by {rms} r.m.s. above {above:g} Hz for a second or more, at no frequency that lasts: so do a hand's "
-    "fast motion, blows, noise, bursts of half a second and what dies away, but an irregular buzz, too."
+    "fast motion, blows, noise, bursts of half a second and motion that dies away, but an irregular buzz does so, too."
 )
 # Motion is beyond noise from this many times the noise of single positions on.
 _BEYOND_NOISE = 3.0
-_HAND = " Its widest swing is at {main:.3g} Hz, {width} peak to peak at most, which a hand can, too."
+_HAND = " Its widest swing is at {main:.3g} Hz, {width} peak to peak at most, which a hand can do, too."
 NEXT = (
     "Which wall and which element suit the device: describe it in a file (haploop scenes premium15 prints one to start "
     "from), and run haploop advise FILE."
 )
 _LEFT_OUT = (
-    " A swing at {at:.1f} Hz, {width} peak to peak, was left out: near {order} times {of:.1f} Hz it may be the shape "
-    "of that slower motion, but it may be a buzz."
+    " A swing at {at:.1f} Hz, {width} peak to peak, was left out: near {order} times {of:.1f} Hz, it may belong to "
+    "the shape of that slower motion, but it may also be a buzz."
 )
 _LOW_PASS = (
-    "Low-pass the estimates, as by --set acceleration.cutoff={acceleration:.0f} or --set "
+    "Low-pass the estimates, as with --set acceleration.cutoff={acceleration:.0f} or --set "
     "velocity.cutoff={velocity:.0f}, until the energy no longer depends on it."
 )
 _NO_LOW_PASS = (
-    "No low-pass of the estimates suits, since the motion itself swings at {main:.3g} Hz; record it with a finer or "
-    "faster encoder."
+    "No low-pass of the estimates is suitable, since the motion itself swings at {main:.3g} Hz; record it with a finer "
+    "or faster encoder."
 )
 # Cutoffs, Hz, which are at least this many times the frequency at which the motion swings.
 _CUTOFFS, _ABOVE_MAIN = {"acceleration": 20.0, "velocity": 50.0}, 3.0

@@ -200,8 +200,8 @@ def _open_lines(path: Path) -> Iterator[Iterator[str]]:
             with path.open("rb") as bytes_of:
                 code = "UTF-16" if bytes_of.read(2) in _UTF_16 else "CP1252"
             raise RecordingError(
-                f"The recording {path} must be UTF-8 text, which it is not; save it as such, or turn it into it: iconv "
+                f"The recording {path} must be UTF-8 text, which it is not; save it as such, or convert it: iconv "
                 f"-f {code} -t UTF-8 {shlex.quote(path.name)} > other.csv."
             ) from error
         except csv.Error as error:
-            raise RecordingError(f"The recording {path} is no table: a cell is longer than any number.") from error
+            raise RecordingError(f"The recording {path} is not a table: a cell is longer than any number.") from error

@@ -32,7 +32,7 @@ _LIMITS = {
     "acceleration": Limits("a recorded acceleration of {} at most", "m/s²", 1e-2, 1e3, "--acceleration-unit"),
     "force": Limits("a recorded force of {} at most", "N", 0.02, 200.0, "--force-unit"),
 }
-_CAN_HARDLY_BE = "Can that be meant: {what}? If not, a unit is wrong; say with {option} which it is."
+_CAN_HARDLY_BE = "Can this be right: {what}? If not, a unit is wrong; give the right one with {option}."
 
 
 class Largest:

@@ -146,7 +146,7 @@ class LogRecording:
         if scene.actuator not in (None, Actuator()):
             remarks.append(
                 "The true energies of the recorded force are those of the force that the actuator applied; all else, "
-                "sampled energies and the elements among it, goes by the forces commanded."
+                "including sampled energies and the elements, uses the forces commanded."
             )
 
     def samples(self) -> Iterator[Samples]:
@@ -186,7 +186,7 @@ class _Waiting:
     def add(self, batch: Batch) -> None:
         rows, wanted = batch.rows, _COLUMNS[batch.topic]
         if not isinstance(rows, Table) or not rows.keys() >= set(wanted) or not np.isfinite(rows[wanted[0]]).all():
-            raise RecordingError(f"The log is none of a run: {', '.join(wanted)} were expected on {batch.topic}.")
+            raise RecordingError(f"The log is not that of a run: {', '.join(wanted)} were expected on {batch.topic}.")
         if batch.topic == "/plant":
             self._plant = np.hstack([self._plant, [rows[name] for name in _COLUMNS["/plant"]]])
         else:

@@ -81,7 +81,7 @@ class TextRecording:
         self._rate_Hz = layout.rate_Hz
         self._columns, self._scales = self._choose(file, layout)
         if file.title:
-            self.notes.remarks.append(f"Lines above the header, taken for a title: {file.title}.")
+            self.notes.remarks.append(f"Lines above the header, taken as a title: {file.title}.")
         self.has_force = "force" in self._columns
         if not self.has_force and (unread := file.find(_FORCES)):
             self.notes.remarks.append(f"Column {unread.name} was not read: --force {unread.name} books its work.")
@@ -115,7 +115,7 @@ class TextRecording:
             # The unit of such a column is not that of the position: an inertial sensor has its own.
             if layout.length and what in ("velocity", "acceleration") and not unit and not column.unit:
                 raise RecordingError(
-                    f"In which unit is the {what} in column {column.name}? --unit is that of the position alone; "
+                    f"In which unit is the {what} in column {column.name}? --unit is for the position alone; "
                     f"give --{what}-unit, such as {si}."
                 )
             try:
@@ -124,7 +124,7 @@ class TextRecording:
                 option = "--unit" if what == "position" else f"--{what}-unit"
                 amount = "11 um" if what == "position" else f"0.1 {si}"
                 raise RecordingError(
-                    f'{error} Give {option}: a unit, or {si} a count, as a number or text such as "{amount}".'
+                    f'{error} Give {option}: a unit, or {si} per count, as a number or text such as "{amount}".'
                 ) from error
         return columns, scales
 
@@ -216,7 +216,7 @@ class TextRecording:
         low, high = self._reach_m
         if not self._in_metres and high - low > _DOUBTFUL_M:
             self.notes.remarks.append(
-                f"Column {self._columns['position'].name} has no unit and is taken for metres, {high - low:.3g} m peak "
+                f"Column {self._columns['position'].name} has no unit and is taken as metres, {high - low:.3g} m peak "
                 "to peak; if it is not, give --unit, such as mm."
             )
 
@@ -226,7 +226,7 @@ class TextRecording:
         if not self._in_metres and high - low > _FAR_M:
             raise RecordingError(
                 f"Are the positions in column {self._columns['position'].name} of {self._file.path}, from {low:.6g} "
-                f"to {high:.6g}, metres, millimetres or counts? Give --unit m, mm or metres a count, such as 30e-6."
+                f"to {high:.6g}, metres, millimetres or counts? Give --unit m, mm or metres per count, such as 30e-6."
             )
 
     def _rows(self) -> Iterator[tuple[dict[str, Floats], Floats]]:
