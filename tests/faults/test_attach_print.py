@@ -77,4 +77,4 @@ def test_a_printer_whose_run_vanishes_ends_by_itself(running, printing):
     run.signal(signal.SIGKILL)
     run.end(-signal.SIGKILL)
     printer.end(1)
-    assert "(failed): Its launcher has gone without a word." in printer.stderr
+    assert "(failed): Its launcher has ended without a word." in printer.stderr

@@ -82,7 +82,7 @@ def test_what_a_steady_verdict_rests_on_is_told_with_the_answer_and_counted() ->
 def test_a_map_of_cheap_verdicts_says_that_no_run_was_pushed(data: MapData) -> None:
     cheap = dataclasses.replace(data, sweep={**data.sweep, "base": {"title": "a base", "run": {"verdict": "window"}}})
     told = legend(make_figure(cheap))
-    assert "No run was pushed: the words are what its last half second shows" in told
+    assert "No run was pushed: the words describe its last half second" in told
     assert "Stiffest wall on which no swing was seen: 300 N/m" in told
     assert "swinging: swing, peak to peak" in told
     assert not any(word in told for word in ("steady", "limit cycle:"))

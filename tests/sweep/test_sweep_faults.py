@@ -72,8 +72,8 @@ def test_interrupted_once_it_stores_what_is_under_way_and_says_how_to_go_on(
     wait_for("a part", lambda: parts(out))
     run.signal(signal.SIGINT)
     run.end(1)
-    assert "Stopping after the cells under way; once more ends at once." in run.stderr
-    assert f"to go on: haploop sweep {out / 'sweep.toml'} --out {out}" in run.stderr
+    assert "Stopping after the cells in progress; interrupt again to end at once." in run.stderr
+    assert f"to continue: haploop sweep {out / 'sweep.toml'} --out {out}" in run.stderr
     assert "Traceback" not in run.stderr
     done = cells(out)
     assert 0 < len(done) < CELLS
@@ -112,7 +112,7 @@ def test_a_full_disk_is_said_and_loses_nothing_that_was_written(
     run.end(1)
     assert f"Writing {out}" in run.stderr
     assert "File too large" in run.stderr
-    assert "the same command goes on" in run.stderr
+    assert "the same command continues" in run.stderr
     assert "Traceback" not in run.stderr
     assert not list(out.rglob("*.part"))
     kept = cells(out)
@@ -247,7 +247,10 @@ def test_a_damaged_table_is_refused_and_gives_no_other_number(tmp_path: Path) ->
 def test_a_finished_sweep_with_a_damaged_summary_is_told_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     axes, out = '[axes]\n"wall.stiffness" = [100, 200]\n', tmp_path / "out"
     swept(tmp_path, axes, out=out)
-    for text, sentence in (("{}", "is none of a sweep: it lacks cells"), ("[", "is no JSON object that haploop wrote")):
+    for text, sentence in (
+        ("{}", "is not that of a sweep: it lacks cells"),
+        ("[", "is no JSON object that haploop wrote"),
+    ):
         (out / "summary.json").write_text(text)
         with pytest.raises(SystemExit, match="1"):
             swept(tmp_path, axes, out=out)

@@ -180,7 +180,7 @@ holds = "stedy"
         ('"wall.stiffness" = { from = 1, to = 800, count = 1 }', "stiffness.count is 1. It must be at least 2."),
         ('"wall.stiffness" = { to = 800, count = 2 }', "axes.wall.stiffness.from is missing."),
         ('"wall.stiffness" = [1, -2]', "axes.wall.stiffness.1 is -2. It must be at least 0 N/m."),
-        ('"wall.stiffness" = [1, "1 N/m"]', "axes.wall.stiffness.1 is \"1 N/m\". Every value may stand there once."),
+        ('"wall.stiffness" = [1, "1 N/m"]', "axes.wall.stiffness.1 is \"1 N/m\". Every value may be given only once."),
         ('"wall.stiffness" = []', "axes.wall.stiffness is []. It must have at least one value."),
         ('"wall.stiffness" = 7', "is 7. It must be a list, or a table with from, to"),
         ('wall.stiffness = [1]', "axes.wall is a table. Write the whole key in quotes"),
@@ -188,7 +188,7 @@ holds = "stedy"
         ('"clock.integrator" = ["exact", "exakt"]', 'axes.clock.integrator.1 is "exakt"; did you mean exact?'),
         ('"clock.plant_rate" = [10000, 10000.5]', "axes.clock.plant_rate.1 is 10000.5. It must be a whole number"),
         ('"dissipation.1.damping" = [1]', "[dissipation.1] of the base scene names no kind"),
-        ('"dissipation.first.damping" = [1]', "dissipation is a list, counted from 0, so first is none of its places."),
+        ('"dissipation.first.damping" = [1]', "dissipation is a list, counted from 0, so first is not a place in it."),
         ('"wall.stiffness.top" = [1]', "wall.stiffness holds a value, not a table."),
         ('"velocity.cutof" = [1]', "is not a key of [velocity]; did you mean cutoff?"),
         ('" " = [1]', "It must be a dotted key, such as wall.stiffness."),
@@ -228,7 +228,7 @@ def test_a_bisection_that_cannot_be_made_is_one_mistake_that_says_why(bisect: st
 
 def test_the_values_of_the_bisected_axis_go_one_way(tmp_path: Path) -> None:
     text = '[axes]\n"wall.stiffness" = [1, 3, 2]\n[bisect]\naxis = "wall.stiffness"\nrelative = 0.1\n'
-    assert "must go one way" in mistakes(tmp_path, text)[0]
+    assert "must all increase or all decrease" in mistakes(tmp_path, text)[0]
 
 
 def test_a_sweep_has_a_scene_or_holds_one(tmp_path: Path) -> None:

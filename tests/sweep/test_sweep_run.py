@@ -94,7 +94,7 @@ def test_a_finished_sweep_is_not_run_again_and_says_so(tmp_path: Path, capsys: p
     swept(tmp_path)
     stamp = (tmp_path / "out" / "table.parquet").stat().st_mtime_ns
     swept(tmp_path)
-    assert "Every cell of this sweep is there already" in capsys.readouterr().err
+    assert "Every cell of this sweep is already there" in capsys.readouterr().err
     assert (tmp_path / "out" / "table.parquet").stat().st_mtime_ns == stamp
 
 

@@ -26,7 +26,7 @@ def draw_any(directories: Sequence[Path], target: Path | None = None) -> Path:
     first, *others = directories
     if sweeps := [path for path in directories if is_sweep(path)]:
         if others:
-            raise FigureError(f"{sweeps[0]} is a sweep, which is drawn by itself; runs are drawn together.")
+            raise FigureError(f"{sweeps[0]} is a sweep, which is drawn alone; only runs are drawn together.")
         from haploop.tools.sweep.map.figure import draw_map
 
         return draw_map(first, target)

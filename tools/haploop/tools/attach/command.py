@@ -78,7 +78,7 @@ def _log(run: LiveRun, context: SecureContext, directory: Path, received: list[i
         welcome = client.join({})
         write_scene(Scene.from_dict(welcome["scene"]), directory)
         node.start(welcome, directory)
-        print(f"logging run {run.id} from tick {node.session.logger.tick} on; Ctrl-C leaves", file=sys.stderr)
+        print(f"logging run {run.id} from tick {node.session.logger.tick} on; Ctrl-C stops logging", file=sys.stderr)
         tick, summary = node.run()
         client.leave("LEAVE", tick)
         return summary

@@ -113,7 +113,7 @@ class ObservedRun:
         """Counts what was missed of a run whose END never came; its summary tells how long it was."""
         summary = read_summary(self._run, self.observer.welcome)
         if summary is None:
-            self.failure = "Its launcher has gone without a word."
+            self.failure = "Its launcher has ended without a word."
             return
         end = summary["from_tick"] + summary["ticks"]
         missed = (end - tick for role, tick in self._received.items() if role not in self.observer.ended)

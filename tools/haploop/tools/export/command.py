@@ -97,7 +97,7 @@ def new_files(targets: Sequence[Path], replace: bool) -> Iterator[list[IO[bytes]
     """
     for target in targets:
         if target.is_dir() or (target.exists() and not replace):
-            hint = "" if target.is_dir() else ", or write over it with --force"
+            hint = "" if target.is_dir() else ", or overwrite it with --force"
             raise OutputError(f"{target} exists already; name another place with --out{hint}.")
     parts = [target.with_name(f"{target.name}.part") for target in targets]
     opened: list[IO[bytes]] = []

@@ -66,7 +66,7 @@ def sweep(request: Request, as_json: bool) -> None:
             leave(str(error), FAILED)
         except KeyboardInterrupt:
             leave(
-                "Interrupted at once; what was stored is kept, and the same command with the same --out goes on.",
+                "Interrupted at once; what was stored is kept, and the same command with the same --out continues.",
                 FAILED,
             )
     if as_json:
@@ -75,7 +75,7 @@ def sweep(request: Request, as_json: bool) -> None:
         print(_summary_sentences(summary))
     print(directory, file=sys.stderr)
     if summary["ended"] != "done":
-        leave(f"Stopped; to go on: haploop sweep {directory / SWEEP} --out {directory}", FAILED)
+        leave(f"Stopped; to continue: haploop sweep {directory / SWEEP} --out {directory}", FAILED)
 
 
 def carry_out(request: Request) -> tuple[Path, Summary]:
@@ -103,10 +103,10 @@ def _run(request: Request, made: Sweep, directory: Path) -> Summary:
     schema = make_schema(made.columns(), made.toml())
     with interrupts(usual_from=2) as received, Store(directory, schema) as store:
         if store.finished:
-            print("Every cell of this sweep is there already; nothing was run.", file=sys.stderr)
+            print("Every cell of this sweep is already there; nothing was run.", file=sys.stderr)
             summary = read(path)
             if missing := _NEEDED - summary.keys():
-                raise LogError(f"The summary {path} is none of a sweep: it lacks {', '.join(sorted(missing))}.")
+                raise LogError(f"The summary {path} is not that of a sweep: it lacks {', '.join(sorted(missing))}.")
             return summary
         with SweepProgress(made.title) as progress:
             ended, found = "done", []

@@ -104,7 +104,9 @@ class SweepProgress:
         """Tells whether interrupts have been received; says so once, on a terminal or not."""
         if received and not self._stopping:
             self._stopping = True
-            self._bars.console.print("Stopping after the cells under way; once more ends at once.", highlight=False)
+            self._bars.console.print(
+                "Stopping after the cells in progress; interrupt again to end at once.", highlight=False
+            )
         return bool(received)
 
 

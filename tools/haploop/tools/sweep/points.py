@@ -62,7 +62,7 @@ def number_at(path: Sequence[str], scene: Layers, kinds: Mapping[str, type[Eleme
             value = value.get(part) if isinstance(value, dict) else None
         elif lists := [choice for choice in choices if get_origin(choice) is list]:
             if not part.isdecimal():
-                raise AxisError(f"{place} is a list, counted from 0, so {part} is none of its places.", _NOT_SET)
+                raise AxisError(f"{place} is a list, counted from 0, so {part} is not a place in it.", _NOT_SET)
             choices = [*_alternatives(get_args(lists[0])[0])]
             value = value[int(part)] if isinstance(value, list) and int(part) < len(value) else None
         elif any(get_origin(choice) is dict for choice in choices):
@@ -140,7 +140,7 @@ def make_points(span: Span, number: Number) -> list[float]:
     if span.scale == "log":
         assert span.count
         if not first * last > 0.0:
-            raise AxisError("A log scale needs two ends of one sign, neither of them 0.", place="scale")
+            raise AxisError("A log scale needs two ends of the same sign, neither of them 0.", place="scale")
         inner = (first * (last / first) ** (k / (span.count - 1)) for k in range(1, span.count - 1))
         values = [first, *inner, last]
         return list(dict.fromkeys(map(round, values))) if number.quantity.whole else values
@@ -162,7 +162,7 @@ def listed(values: list[Any], number: Number | None) -> list[Any]:
     seen: set[str] = set()
     for place, value in enumerate(read):
         if repr(value) in seen:
-            raise AxisError("Every value may stand there once.", place=place)
+            raise AxisError("Every value may be given only once.", place=place)
         seen.add(repr(value))
     return read
 

@@ -81,7 +81,7 @@ class Store:
                     file.unlink()
                 except OSError as error:
                     raise StoreError(
-                        f"{file} is no part of a sweep and cannot be removed: {error.strerror}."
+                        f"{file} is not a part of a sweep and cannot be removed: {error.strerror}."
                     ) from error
         self.rows = len(rows)
         return rows
@@ -141,7 +141,7 @@ class Store:
             reason = error.strerror or str(error)
             raise StoreError(
                 f"Writing {temporary.with_suffix('')} failed: {reason}. The {self.rows} cells written before are safe; "
-                "once there is room, the same command goes on."
+                "once there is room, the same command continues."
             ) from error
 
 

@@ -264,7 +264,9 @@ class _Reader:
         elif axis and (axis.unit is None or axis.whole or len(axis.values) < 2):
             self._layers.complain(place, "It must be an axis of two or more numbers that need not be whole.")
         elif axis and len({b > a for a, b in zip(axis.values, axis.values[1:], strict=False)}) > 1:
-            self._layers.complain(("axes", key), "The values of the axis that is bisected must go one way.")
+            self._layers.complain(
+                ("axes", key), "The values of the axis that is bisected must all increase or all decrease."
+            )
         tolerance_given, relative = given.get("tolerance"), given.get("relative")
         if (tolerance_given is None) == (relative is None):
             self._layers.complain(("bisect",), "It must have exactly one of tolerance and relative.")

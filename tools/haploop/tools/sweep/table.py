@@ -147,7 +147,7 @@ def read(directory: str | Path) -> SweepTable:
     except OSError as error:
         raise TableError(f"{directory} holds no sweep that can be read: {SWEEP}: {error.strerror}.") from error
     except (ValueError, RecursionError) as error:
-        raise TableError(f"{directory / SWEEP} is damaged: it is no TOML.") from error
+        raise TableError(f"{directory / SWEEP} is damaged: it is not TOML.") from error
     finished, boundary = (directory / TABLE).exists(), directory / BOUNDARY
     files = [directory / TABLE] if finished else sorted((directory / PARTS).glob("*.parquet"))
     tables = [read_part(file, text) for file in files]
@@ -162,7 +162,7 @@ def read(directory: str | Path) -> SweepTable:
 
 def read_part(path: Path, sweep: str) -> Any:
     """Reads a Parquet file of a sweep, whose text it holds; TableError where it is damaged or of another sweep."""
-    arrow, why = pyarrow(), "it is none that haploop wrote"
+    arrow, why = pyarrow(), "haploop did not write it"
     try:
         demand_regular(path)
         # Threads and read-ahead would keep extra memory for every file.
@@ -172,7 +172,7 @@ def read_part(path: Path, sweep: str) -> Any:
         if held.get(_CHECKSUM) not in (None, _checksum(table.schema)):
             why = "its columns do not match their checksum"
         elif held.get(b"sweep", b"").decode() != sweep:
-            why = f"it is that of another sweep than {SWEEP} beside it"
+            why = f"it belongs to another sweep than {SWEEP} beside it"
         else:
             return table
     except OSError as error:

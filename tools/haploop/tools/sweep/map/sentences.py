@@ -19,14 +19,14 @@ _BETWEEN, _LETTERS, _LEAST_LETTERS = "   ·   ", 185, 12
 _REASON_LETTERS = 160
 # For pushed runs, and for those of which only the window was looked at.
 _NONE = (
-    "No wall is steady from the softest one on that was tried.",
-    "There is no wall, from the softest one on that was tried, on which no swing was seen.",
+    "No wall is steady, counting from the softest one tried.",
+    "There is no wall, counting from the softest one tried, on which no swing was seen.",
 )
 _STIFFEST = (
-    ("Stiffest steady wall", "Every softer one tried there is steady, too."),
-    ("Stiffest wall on which no swing was seen", "Nor was one on any softer one tried there."),
+    ("Stiffest steady wall", "Every softer wall tried there is steady, too."),
+    ("Stiffest wall on which no swing was seen", "None was seen on any softer wall tried there, either."),
 )
-_UNPUSHED = "No run was pushed: the words are what its last half second shows, and say little of stability."
+_UNPUSHED = "No run was pushed: the words describe its last half second, and say little about stability."
 
 
 def description(data: MapData, cells: Cells) -> str:
@@ -77,7 +77,7 @@ def _answer(data: MapData, cells: Cells) -> str:
         return _NONE[data.is_unpushed]
     others = _place(pair for pair in zip(axes, found.index, strict=True) if pair[0].key != STIFFNESS)
     stiffest, softer = _STIFFEST[data.is_unpushed]
-    more = "No stiffer one was tried." if found.open_end else softer
+    more = "No stiffer wall was tried." if found.open_end else softer
     told = data.provisos(int(cells.row[found.index]))
     yet = f" Yet: {', '.join(told)}." if told else ""
     return f"★ {stiffest}: {spring(found.value)}{others}. {more}{yet}"
@@ -122,10 +122,10 @@ def map_notes(data: MapData, cells: Cells, layout: Layout, lines: Sequence[Panel
         f"The first {len(lines)} of {panels} panels are drawn.": panels > len(lines),
         f"No exact limit{some}, since the loop is not linear: {reasons}.": reasons,
         f"Outside the {where}: {outside}.": outside,
-        "The worst verdict of the seeds is shown; a number such as 2/5 (a dot in small cells): so many of them "
-        "came to it, the others to milder ones.": (cells.agree < cells.seeds).any(),
-        "Upright lines reach down to the seed that swings least.": layout.y is None and len(data.seeds) > 1,
-        "Limit cycles as they swing on after a push, all else at the end of its run.": layout.y is None
+        "The worst verdict of the seeds is shown; a number such as 2/5 (a dot in small cells) says how "
+        "many came to it; the others came to milder ones.": (cells.agree < cells.seeds).any(),
+        "Vertical lines reach down to the seed that swings least.": layout.y is None and len(data.seeds) > 1,
+        "Limit cycles: the swing that lasts after a push; all else: at the end of its run.": layout.y is None
         and WIDTH in data.columns,
         "How far limit cycles swing was not recorded.": not data.has_amplitudes
         and Verdict.LIMIT_CYCLE in cells.verdict,
@@ -137,12 +137,12 @@ def edge_notes(data: MapData, edges: Edges, best: Answer | None, lines: Sequence
     """Returns the notes beside the boundaries of a search, of which these lines are drawn; the answer first."""
     reasons, holds = _reasons(lines), edges.holds
     rows = len(edges.others[1].values) if len(edges.others) > 1 else 1
-    more = " under the seed that is so least far, bars of all seeds" if len(data.seeds) > 1 else ""
+    more = " (for the seed that gets least far; bars span all seeds)" if len(data.seeds) > 1 else ""
     return _those({
         f"★ Furthest: {best.words[0]}{_place(zip(edges.others, best.index, strict=True))}." if best else "": True,
         f"The first {len(lines)} of {rows} lines are drawn.": len(lines) < rows,
-        f"Points are the last values that were seen to be {holds}{more}; upright bars reach to the first that was seen "
-        f"not to be, over what is undecided. Each boundary is the first change from {edges.begin} on.": True,
+        f"Points are the last values that were seen to be {holds}{more}; vertical bars reach to the first that was "
+        f"seen not to be, across undecided ones. Each boundary is the first change from {edges.begin} on.": True,
         f"{'▲' if edges.rising else '▼'} {holds} at every point that was tried.": State.ALL_HOLD in edges.state,
         f"× not {holds} where the search begins.": State.NONE_HOLDS in edges.state,
         "? a run failed before a boundary was found.": State.UNKNOWN in edges.state,
