@@ -132,7 +132,7 @@ def attach(
     what: Annotated[str, typer.Argument(help="logger, print or plotjuggler", show_default=False)],
     out: Annotated[Path | None, typer.Option(help="directory of the attached logger [runs/RUN-TIME]")] = None,
     port: Annotated[
-        int | None, typer.Option(min=0, max=65535, help="of this machine, for PlotJuggler; 0: any free one [9872]")
+        int | None, typer.Option(min=0, max=65535, help="port of this machine, for PlotJuggler; 0: any free one [9872]")
     ] = None,
     run: Run = None,
 ) -> None:

@@ -37,7 +37,7 @@ def dissipate(
     damping: Annotated[list[str] | None, typer.Option(metavar="B", help='damping, N s/m or "0.0027 N s/mm"')] = None,
     mass: Annotated[list[str] | None, typer.Option(metavar="M", help="bi- and unidirectional inertia, kg")] = None,
     element: Annotated[
-        list[str] | None, typer.Option(metavar="ELEMENT", help='any other: "KIND KEY=VALUE ..."')
+        list[str] | None, typer.Option(metavar="ELEMENT", help='any other element: "KIND KEY=VALUE ..."')
     ] = None,
     position: Annotated[
         str | None, typer.Option(metavar="COLUMN", help="column of the position, name or number from 1 [x or position]")
@@ -46,20 +46,24 @@ def dissipate(
         str | None, typer.Option(metavar="COLUMN", help="column of the time [t, time or timestamp]")
     ] = None,
     rate: Annotated[float | None, typer.Option(min=1e-6, max=1e9, help="samples per second, in place of times")] = None,
-    velocity: Annotated[str | None, typer.Option(metavar="COLUMN", help="recorded, not estimated")] = None,
-    acceleration: Annotated[str | None, typer.Option(metavar="COLUMN", help="recorded, not estimated")] = None,
+    velocity: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="column of a recorded velocity, else estimated")
+    ] = None,
+    acceleration: Annotated[
+        str | None, typer.Option(metavar="COLUMN", help="column of a recorded acceleration, else estimated")
+    ] = None,
     force: Annotated[
         str | None, typer.Option(metavar="COLUMN", help="commanded force on the device: its work, and the sum F v T")
     ] = None,
     unit: Annotated[
-        str | None, typer.Option(help="of the position, such as mm, or metres per count [the header's (unit), m]")
+        str | None, typer.Option(help="unit of the position, such as mm, or metres per count [the header's (unit), m]")
     ] = None,
     time_unit: Annotated[str | None, typer.Option(help="such as ms [the header's (unit), s]")] = None,
     velocity_unit: Annotated[str | None, typer.Option(help="such as mm/s [the header's (unit), m/s]")] = None,
     acceleration_unit: Annotated[str | None, typer.Option(help="such as g_0 [the header's (unit), m/s^2]")] = None,
     force_unit: Annotated[str | None, typer.Option(help="such as mN [the header's (unit), N]")] = None,
     wall: Annotated[str | None, typer.Option(metavar="POSITION", help="elements act only beyond it, m or text")] = None,
-    occupies: Annotated[str, typer.Option(metavar="below|above", help="which side of it the wall is")] = "below",
+    occupies: Annotated[str, typer.Option(metavar="below|above", help="on which side of it the wall is")] = "below",
     delay: Annotated[
         str | None, typer.Option(metavar="TIME", help="age of a force when it acts [0; that of a run]")
     ] = None,

@@ -38,7 +38,9 @@ _NICE = 10
 @for_a_run
 def view(
     run: Annotated[str | None, typer.Option("--run", metavar="ID", help="which run to show first [the newest]")] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, metavar="PORT", help="of this machine; 0: any free one")] = 0,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, metavar="PORT", help="port of this machine; 0: any free one")
+    ] = 0,
     since: Annotated[
         str, typer.Option(metavar="start|now", help="start: also show what was logged before; now: do not")
     ] = "start",

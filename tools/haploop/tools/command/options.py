@@ -69,7 +69,7 @@ Hand = Annotated[
     str | None,
     typer.Option(metavar="HAND", help=_A_HAND, autocompletion=complete("hands")),
 ]
-Delay = Annotated[str | None, typer.Option(metavar="TIME", help='round trip, s or "2 ms"')]
+Delay = Annotated[str | None, typer.Option(metavar="TIME", help='round-trip delay, s or "2 ms"')]
 Estimator = Annotated[
     str | None, typer.Option(metavar="NAME", help="difference, window, foaw, kalman or accelerometer")
 ]

@@ -63,7 +63,7 @@ def find_boundaries(
         ValueError: there are fewer than two points, or they neither only rise nor only fall.
     """
     if {(b > a) - (b < a) for a, b in pairwise(points)} not in ({1}, {-1}):
-        raise ValueError("A boundary is sought between at least two points that increase, or that decrease.")
+        raise ValueError("A boundary is sought between at least two points that all increase or all decrease.")
     failures: dict[Candidate, str] = {}
     answered: dict[Candidate, bool | None] = {}
     why: dict[int, str] = {}

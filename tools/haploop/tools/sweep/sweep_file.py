@@ -37,7 +37,7 @@ from haploop.tools.sweep.table import Column
 
 MOST_AXES = 3
 _SCENE = (
-    "This is a scene, for haploop run. A sweep is a file of its own that names a scene and what is varied in it: "
+    "This is a scene, for haploop run. A sweep is a separate file that names a scene and what is varied in it: "
     'scene = "{0}", then [axes], then a line such as "wall.stiffness" = [500, 1000, 2000].'
 )
 _KINDS_UNLESS_GIVEN = {"wall": "spring"}
@@ -262,7 +262,7 @@ class _Reader:
         if key not in keys:
             self._layers.complain(place, f"It must be an axis: {', '.join(keys)}.", None, nearest(key, keys))
         elif axis and (axis.unit is None or axis.whole or len(axis.values) < 2):
-            self._layers.complain(place, "It must be an axis of two or more numbers that need not be whole.")
+            self._layers.complain(place, "It must be an axis of two or more numbers, of a key that takes fractions.")
         elif axis and len({b > a for a, b in zip(axis.values, axis.values[1:], strict=False)}) > 1:
             self._layers.complain(
                 ("axes", key), "The values of the axis that is bisected must all increase or all decrease."
