@@ -201,8 +201,12 @@ def test_readme_shows_what_its_walk_comes_to(reader: Reader) -> None:
     report = said["run demo --set event=[] --out runs/buzz"]
     assert re.match(r"limit-cycle\b", report)
     assert re.search(r"[\d.]+ mm .*at [\d.]+ Hz", report)
-    leak = json.loads((reader.folder / "runs/buzz/summary.json").read_text(encoding="utf-8"))["energy"]["wall"]["leak"]
-    assert "most of what the wall gives away comes of the delay. Quantisation has no part in it" in README
+    summary = json.loads((reader.folder / "runs/buzz/summary.json").read_text(encoding="utf-8"))
+    leak = summary["energy"]["wall"]["leak"]
+    assert "most of the energy that the wall generates is caused by the delay" in README
+    assert "Quantisation has no part in it: with an encoder 1000 times as fine the loop swings on" in README
+    assert "without the delay it rests." in README
+    assert summary["stability"]["without"] == {"delay": "rests", "encoder": "swings on"}
     assert leak["delay_J"] < 0.5 * leak["total_J"] < 0.0
     assert leak["quantisation_J"] > 0.01 * leak["total_J"]
     check_map(reader)
@@ -218,13 +222,13 @@ def figures(words: str) -> list[float]:
 def check_map(reader: Reader) -> None:
     """Checks what README says of the map of step 3."""
     (cells,) = figures(r"A sweep runs a scene over two axes \((\d+) cells")
-    stiffness_N_mm, damping = figures(r"At ([\d.]+) N/mm ([\d.]+) N s/m will do in this scene")
+    stiffness_N_mm, damping = figures(r"At ([\d.]+) N/mm, ([\d.]+) N s/m of damping is enough in this scene")
     table = read_table(reader.folder / "runs/damping")
     assert len(table["verdict"]) == cells
     keys = zip(table["wall.stiffness"], table["dissipation.0.damping"], strict=True)
     found = {(round(k), round(b, 3)): place for place, (k, b) in enumerate(keys)}
     assert table["verdict"][found[round(1e3 * stiffness_N_mm), damping]] == "steady"
-    assert "the map says of every steady cell that only friction holds it" in README
+    assert "the map marks every steady cell as held by friction alone" in README
     steady = [
         str(of) for word, of in zip(table["verdict"], table["stability.provisos"], strict=True) if word == "steady"
     ]

@@ -83,7 +83,7 @@ def test_the_word_of_a_run_with_a_half_of_somebody_elses_is_that_of_its_window_a
     assert not awaits_verdict(of.scene, of.summary)
     text = " ".join(shown(summary_table(of.summary), 100).split())
     assert not text.startswith("steady")
-    assert f"That the {role} does what the scene says is its own word; haploop replay holds it against" in text
+    assert f"Only the {role} itself says that it does what the scene says; haploop replay checks it against" in text
     of.summary["programs"][role] |= {"name": "", "version": "", "command": ""}
     assert f"{role} not haploop's own a program without a name" in " ".join(
         shown(summary_table(of.summary), 80).split()

@@ -65,7 +65,7 @@ def test_what_a_steady_loop_rests_on_stands_in_the_demo_s_sentence_in_its_colour
 
 def test_the_demo_says_why_of_the_time_before_the_swap() -> None:
     told = story(part("limit-cycle", delay_J=-2e-3), part("steady", delay_J=3e-3)).why()
-    assert told.startswith("Up to 1 s the wall gave the device 2.00 mJ more than an ideal one would have, 100 % of it")
+    assert told.startswith("Up to 1 s, the wall gave the device 2.00 mJ more than an ideal one would have, 100 % of it")
 
 
 def test_the_demo_fits_into_80_columns_and_shows_hertz_and_newtons_of_either_side() -> None:

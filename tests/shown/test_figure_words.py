@@ -52,7 +52,7 @@ def test_the_first_note_on_a_scene_stands_below_its_figure_with_how_many_there_a
     assert below.get_text().startswith("A note on its scene: wall.stiffness is 15 N/m; is that the unit")
     more = replace(soft, duration=1e6)
     [below] = artists(make_figure(replace(data, scene=more)), "events")
-    assert below.get_text().startswith("2 notes on its scene, of which the first: wall.stiffness is 15 N/m")
+    assert below.get_text().startswith("2 notes on its scene; the first: wall.stiffness is 15 N/m")
 
 
 def test_what_events_set_is_told_with_the_unit_that_it_has_at_that_time() -> None:

@@ -44,7 +44,7 @@ def test_the_summary_table_holds_every_book_and_the_residual(swap: dict[str, Any
     window = swap["window"]
     swing, ripple = (amount(window[key], "N") for key in ("force_swing_N", "force_ripple_N"))
     assert row(text, "force  ") == [f"{swing} peak to peak at its end"]
-    assert f"{ripple} peak to peak, of what is faster than 30 Hz alone" in " ".join(text.split())
+    assert f"{ripple} peak to peak, above 30 Hz only" in " ".join(text.split())
     assert row(text, "leak by delay") == [amount(energy["wall"]["leak"]["delay_J"], "J")]
     assert row(text, "work of the hand") == [amount(energy["hand_work_J"], "J")]
     assert row(text, "heat in the device") == [amount(energy["device_heat_J"], "J")]
@@ -60,7 +60,7 @@ def test_the_report_ends_with_the_verdict_and_the_first_of_the_notes_and_without
     ends = [shown(summary_table(swap, two[:count]), 200).strip().splitlines()[-1] for count in (1, 2)]
     word = swap["verdict"]
     assert ends[0] == f"{word}  A note on its scene: The wall is soft."
-    assert ends[1] == f"{word}  2 notes on its scene, of which the first: The wall is soft."
+    assert ends[1] == f"{word}  2 notes on its scene; the first: The wall is soft."
     assert shown(summary_table(swap), 200) in shown(summary_table(swap, two), 200), "all else is as it was"
 
 
@@ -113,8 +113,8 @@ def test_the_likely_cause_is_told_of_what_swings_alone(swap: dict[str, Any], ver
         ),
         ({"delay": "swings on", "encoder": "swings on", "all": "swings on"}, "the hold of each force over a tick, or"),
         ({"encoder": "swings on"}, "the hold of each force over a tick, or"),
-        ({"delay": "swings on", "encoder": "undecided", "all": "rests"}, "not told by these trials."),
-        ({"delay": "swings on", "encoder": "swings on", "all": "undecided"}, "not told by these trials."),
+        ({"delay": "swings on", "encoder": "undecided", "all": "rests"}, "not determined by these trials."),
+        ({"delay": "swings on", "encoder": "swings on", "all": "undecided"}, "not determined by these trials."),
     ],
 )
 def test_the_part_without_which_a_loop_rests_is_its_likely_cause_with_every_trial_and_the_books_beside_it(
@@ -126,7 +126,7 @@ def test_the_part_without_which_a_loop_rests_is_its_likely_cause_with_every_tria
     assert ("rests without its delay" in text) == (without.get("delay") == "rests")
     assert ("swings on with an encoder 1000 times as fine" in text) == (without.get("encoder") == "swings on")
     assert ("is undecided without all of these" in text) == (without.get("all") == "undecided")
-    assert cause(swap["energy"], "By the books of the whole run") in text
+    assert cause(swap["energy"], "According to the books of the whole run") in text
 
 
 def energy(*elements: tuple[str, float], **leak: float) -> dict[str, Any]:
@@ -142,7 +142,7 @@ def energy(*elements: tuple[str, float], **leak: float) -> dict[str, Any]:
         (energy(delay_J=1e-3, sampling_and_hold_J=-2e-3), "held for a tick"),
         (  # its first force comes after the end
             {**energy(), "wall": {**energy(delay_J=-2e-3)["wall"], "true_J": 0.0}},
-            "the wall moved no energy at all: what moves here is not fed by it",
+            "the wall moved no energy at all: the motion here is not fed by it",
         ),
         (energy(quantisation_J=-1e-6), "100 % of it because the encoder rounds"),
         (energy(delay_J=-1e-3, sampling_and_hold_J=2e-3), "no more energy than an ideal one would"),

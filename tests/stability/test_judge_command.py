@@ -46,7 +46,7 @@ def test_the_terminal_says_the_word_first_and_then_why(run):
     result = haploop("judge", str(run("launch/scenes/fig6a.toml")))
     lines = [line.strip() for line in result.stdout.splitlines()]
     assert lines[0] == "limit-cycle"
-    assert lines[1].startswith("Pushes of 0.195 N and a tenth of it end in the same swing")
+    assert lines[1].startswith("Pushes of 0.195 N and of a tenth of it end in the same swing")
     assert any(line.startswith("its force ripples by") for line in lines)
 
 

@@ -132,7 +132,7 @@ def test_of_an_unfelt_swing_that_was_there_all_along_no_time_is_told_after_which
     settled = found(scene(**pressed(encoder={"resolution": 1e-5}, wall={"position": 0.0, "stiffness": 300.0})))
     assert settled.why == "unfelt"
     width = f"{settled.width_m * 1e6:.3g} µm"
-    assert f" within 1.7 s but for {width}" in settled.sentence()
+    assert f" within 1.7 s except for {width}" in settled.sentence()
     swing = next(each for each in swings if decide(each, last=True).why == "unfelt")
     throughout = decide(swing._replace(settles_s=0.0), last=True)
     assert (throughout.word, throughout.settles_s) == ("steady", None)

@@ -120,7 +120,7 @@ def test_a_swing_said_to_last_is_bounded_by_the_one_of_the_two_that_changes_more
     assert finding.most_1_s is not None
     of_the_steadier = abs(finding.rate_1_s) + 2.0 * finding.error_1_s
     assert finding.most_1_s == pytest.approx(of_the_steadier + 0.0009, rel=0.02)
-    bound = f"that which may change more grows or decays by no more than {finding.most_1_s:.2g} 1/s"
+    bound = f"the one that may change more grows or decays by no more than {finding.most_1_s:.2g} 1/s"
     assert bound in finding.sentence()
     assert f"of the steadier swing {finding.rate_1_s:.3g} +- " in shown(finding_table(finding), 200)
 

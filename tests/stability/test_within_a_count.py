@@ -54,7 +54,7 @@ def test_friction_of_0_is_none() -> None:
 def test_what_rests_at_all_places_within_a_count_is_steady_and_says_so() -> None:
     told = judge(ended(replace(premium(320.0), friction=None)), LOOKS_S, thorough=True)
     assert (told.word, told.deeper) == ("steady", "rests")
-    assert told.sentence().endswith("It does where it lies parts of an encoder's count deeper, too.")
+    assert told.sentence().endswith("It also does so where it lies parts of an encoder's count deeper.")
 
 
 @pytest.mark.slow

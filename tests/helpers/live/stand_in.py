@@ -78,7 +78,7 @@ WAITING: dict[str, Any] = {
 LEAK = {"total_J": -1.2e-3, "sampling_and_hold_J": -1e-4, "quantisation_J": 2e-6, "delay_J": -1.1e-3}
 SUMMARY = {
     "title": RUNNING["title"], "duration_s": 3.0, "ended": "done", "verdict": "limit-cycle",
-    "verdict_rule": "Pushes of 0.195 N and a tenth of it end in the same swing.", "trajectory_sha256": "ab" * 32,
+    "verdict_rule": "Pushes of 0.195 N and of a tenth of it end in the same swing.", "trajectory_sha256": "ab" * 32,
     "stability": {
         "rate_1_s": -0.0123, "error_1_s": 0.02, "frequency_Hz": 7.1, "width_m": 5.35e-3, "spread_m": 4.2e-4,
         "force_ripple_N": 0.41, "felt": True, "chaotic": True, "own_share": 0.93,

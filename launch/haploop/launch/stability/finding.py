@@ -27,10 +27,10 @@ _FINE_UM, STILL_1_S = 10.0, 0.05
 
 # What ``Finding.entries`` reports about the run beside the finding.
 BESIDE = {
-    "own_share": "which share of the oscillation in the run's last window the loop keeps up by itself; the rest is the "
-    "hand's own motion or noise, or dies away; null where that cannot be told",
+    "own_share": "share of the oscillation in the run's last window that the loop sustains alone; the rest is the "
+    "hand's own motion or noise, or dies away; null where that is unknown",
     "moved_beside": "what else moved the run at its end: the hand's motion, noise",
-    "provisos": "what the verdict rests on, to be said in the same breath",
+    "provisos": "conditions that the verdict rests on, to be stated together with it",
 }
 # Numbers that only a push gives.
 _OF_PUSH = ("push_N", "watched_s", "frequency_Hz", "width_m", "spread_m", "force_ripple_N")
@@ -210,7 +210,7 @@ class Finding:
         width_um = 1e6 * self.width_m
         width = f"{1e-3 * width_um:.3g} mm" if width_um >= _FINE_UM else f"{width_um:.3g} µm"
         about_s = float(f"{numbers['needs_s']:.2g}")
-        run = f"some {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
+        run = f"a run of about {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
         sentence = WHY[self.why].format(**numbers, width=width, width_um=width_um, run=run, decaying=self._decaying())
         sentence += AFTER_BLOW[self.blown].format(**numbers) if self.blown else ""
         sentence += AT_HARDEST[self.at_hardest].format(**numbers) if self.at_hardest else ""

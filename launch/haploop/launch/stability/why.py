@@ -4,54 +4,55 @@ WHY = {
     "diverged": "The run ended by itself: {detail}.",
     "no contact": "No tick of the window at the end of the run was in contact.",
     "rest": "After a push of {push_N:.3g} N it came to rest, to 5 % within {settles_s:.2g} s.",
-    "unmoved": "After a push of {push_N:.3g} N, which did not move it, it rested.",
-    "unfelt": "After a push of {push_N:.3g} N it came to rest within {settles_s:.2g} s but for "
-    "{width_um:.3g} µm peak to peak, most at {frequency_Hz:.3g} Hz: less than a hand feels{decaying}.",
-    "unfelt throughout": "After a push of {push_N:.3g} N it swung by no more than {width_um:.3g} µm peak to peak, most "
-    "at {frequency_Hz:.3g} Hz: less than a hand feels{decaying}.",
-    "forgets": "Pushes of {push_N:.3g} N and a tenth of it end in the same swing, {width} peak to peak at "
+    "unmoved": "After a push of {push_N:.3g} N, which did not move it, it stayed at rest.",
+    "unfelt": "After a push of {push_N:.3g} N it came to rest within {settles_s:.2g} s except "
+    "for {width_um:.3g} µm peak to peak, mostly at {frequency_Hz:.3g} Hz: less than a hand feels{decaying}.",
+    "unfelt throughout": "After a push of {push_N:.3g} N it swung by no more than {width_um:.3g} µm peak to peak, "
+    "mostly at {frequency_Hz:.3g} Hz: less than a hand feels{decaying}.",
+    "forgets": "Pushes of {push_N:.3g} N and of a tenth of it end in the same swing, {width} peak to peak at "
     "{frequency_Hz:.3g} Hz.",
-    "lasts": "After pushes of {push_N:.3g} N and a tenth of it swings of {width} peak to peak at {frequency_Hz:.3g} Hz "
-    "lasted for {watched_s:g} s; that which may change more grows or decays by no more than {most_1_s:.2g} 1/s (two "
-    "standard errors).",
+    "lasts": "After pushes of {push_N:.3g} N and of a tenth of it, swings of {width} peak to peak at "
+    "{frequency_Hz:.3g} Hz lasted for {watched_s:g} s; the one that may change more grows or decays by no more than "
+    "{most_1_s:.2g} 1/s (two standard errors).",
     "decays": "Its swing of {width} peak to peak at {frequency_Hz:.3g} Hz still decays, by {rate_1_s:.3g} +- "
-    "{error_1_s:.2g} 1/s, and nothing in the loop makes small swings other than large ones.",
+    "{error_1_s:.2g} 1/s, and nothing in the loop makes small swings differ from large ones.",
     "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",
     "leaves the limit": "Its swing grew until the device was beyond its limit.",
     "failed": "The loop failed while it was watched: {detail}",
     "rested": "After a push of {push_N:.3g} N it came to rest.",
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
     "rests off the wall": "After a push of {push_N:.3g} N it came to rest off the wall.",
-    "too few": "It still moves, by {width} peak to peak in half of {watched_s:g} s: too slowly to tell what "
-    "becomes of it; {run} might tell.",
-    "too slow": "Of its swings of {width} peak to peak at {frequency_Hz:.3g} Hz the steadier changes by "
-    "{rate_1_s:.2g} +- {error_1_s:.2g} 1/s, too slowly, or too unlike the other, to tell within {watched_s:g} s; "
-    "{run} might tell.",
+    "too few": "It still moves, by {width} peak to peak in half of {watched_s:g} s: too slowly to tell how "
+    "it will end; {run} might show it.",
+    "too slow": "Of its swings of {width} peak to peak at {frequency_Hz:.3g} Hz, the steadier changes by "
+    "{rate_1_s:.2g} +- {error_1_s:.2g} 1/s: too slowly, or too differently from the other, to be judged within "
+    "{watched_s:g} s; {run} might show it.",
 }
 DECAYING = ", and still decaying by {0:.3g} +- {1:.2g} 1/s"
 # What is said in addition after a blow, and about the loop without its friction.
 AFTER_BLOW = {
-    "rests": " It did after blows of {blow_N:.3g} N for 0.05 s, into the wall and off it, too.",
-    "rests off the wall": " It did after blows of {blow_N:.3g} N for 0.05 s, into the wall and off it, too, there "
-    "where the blow had left it: the hand does not bring it back.",
-    "swings on": " After a harder blow, of {blow_N:.3g} N, it swings on: either may come of how it is touched.",
-    "undecided": " Whether it does after a harder blow, of {blow_N:.3g} N, could not be told.",
+    "rests": " It also did so after blows of {blow_N:.3g} N for 0.05 s, into the wall and off it.",
+    "rests off the wall": " It also did so after blows of {blow_N:.3g} N for 0.05 s, into the wall and off it, "
+    "but where the blow had left it: the hand does not bring it back.",
+    "swings on": " After a harder blow, of {blow_N:.3g} N, it swings on: either may happen, depending on how it is "
+    "touched.",
+    "undecided": " Whether it also does so after a harder blow, of {blow_N:.3g} N, could not be determined.",
 }
 AT_HARDEST = {
-    "rests": " It does at the hand's hardest hold, {hardest_N:.3g} N, too.",
+    "rests": " It also does so at the hand's hardest hold, {hardest_N:.3g} N.",
     "swings on": " At the hand's hardest hold, {hardest_N:.3g} N, it swings on.",
-    "undecided": " Whether it does at the hand's hardest hold, {hardest_N:.3g} N, could not be told.",
+    "undecided": " Whether it also does so at the hand's hardest hold, {hardest_N:.3g} N, could not be determined.",
 }
 DEEPER = {
-    "rests": " It does where it lies parts of an encoder's count deeper, too.",
+    "rests": " It also does so where it lies parts of an encoder's count deeper.",
     "swings on": " Held {deeper_N:.2g} N harder, a part of an encoder's count deeper, it swings on.",
-    "undecided": " Whether it does held {deeper_N:.2g} N harder, a part of an encoder's count deeper, could not be "
-    "told.",
+    "undecided": " Whether it also does so when held {deeper_N:.2g} N harder, a part of an encoder's count deeper, "
+    "could not be determined.",
 }
 FRICTIONLESS = {
-    "rests": " Held so it would without its friction, too.",
-    "swings on": " Only friction holds it: without, its swing would last or grow.",
-    "swings on a part of a count deeper": " Only friction holds it: without, its swing would last or grow a part of an "
-    "encoder's count deeper.",
-    "undecided": " Whether it would without its friction could not be told.",
+    "rests": " Held like this, it would also rest without its friction.",
+    "swings on": " Only friction holds it: without it, its swing would last or grow.",
+    "swings on a part of a count deeper": " Only friction holds it: without it, its swing would last or grow a part of "
+    "an encoder's count deeper.",
+    "undecided": " Whether it would rest without its friction could not be determined.",
 }

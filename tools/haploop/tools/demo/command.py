@@ -15,15 +15,15 @@ from haploop.tools.command.options import FAILED, leave, plain_errors, what_was_
 SCENE, FIGURE = "demo", "figure.png"
 
 _NEXT = (
-    'A word holds for this scene alone. Next: haploop advise {scene} --set "event=[]" tries other holds, delays and '
+    'A verdict holds for this scene alone. Next: haploop advise {scene} --set "event=[]" tries other holds, delays and '
     "devices (minutes); haploop new my.toml, haploop replay {directory}, haploop run {scene} --view."
 )
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="directory in which a new one is made for the run and its figure")] = Path(
-        "runs"
-    ),
+    out: Annotated[
+        Path, typer.Option(help="directory in which a new one is created for the run and its figure")
+    ] = Path("runs"),
 ) -> None:
     """Show in seconds how a wall buzzes, why, and what steadies it. The element is swapped in during contact.
 

@@ -113,7 +113,7 @@ def tell(spec: RunSpec) -> Story:
     assert event.swap is not None
     after = start.run(spec)
     if after["ended"] != "done":
-        raise RunFailed(f"The run was not brought to its end: {after['ended']}.")
+        raise RunFailed(f"The run did not reach its end: {after['ended']}.")
     before = run_in_process(replace(spec.scene, event=(), duration=event.at), spec.kinds, causes=True)
     data = RunData.from_directory(spec.out)
     parts = _part(before, data, event.at), _part(after, data, data.span_s[1])

@@ -19,10 +19,11 @@ _BECAUSE = {
     "sampling_and_hold_J": "each force is held for a tick while the device moves on",
     "quantisation_J": "the encoder rounds the position that the wall answers to",
 }
-_NONE = "{when} the wall gave no more energy than an ideal one would have: what moves here is not fed by the wall."
-_NOTHING = "{when} the wall moved no energy at all: what moves here is not fed by it."
+_NONE = "{when}, the wall gave no more energy than an ideal one would have: the motion here is not fed by the wall."
+_NOTHING = "{when}, the wall moved no energy at all: the motion here is not fed by it."
 _WALL = (
-    "{when} the wall gave the device {energy} more than an ideal one would have, {share:.0f} % of it because {because}."
+    "{when}, the wall gave the device {energy} more than an ideal one would have, {share:.0f} % of it "
+    "because {because}."
 )
 # Parts that a judged loop is tried without: the part, and the loop without it.
 _PARTS = {
@@ -34,14 +35,14 @@ _PARTS = {
 _DOES = {"rests": "rests {}", "swings on": "swings on {}", "undecided": "is undecided {}"}
 _SEVERAL = "{} together, since it rests without any one of them"
 _NO_SINGLE_ONE = "no single part, since it swings on without any one of them"
-_THE_REST = "the hold of each force over a tick, or what else the scene simulates"
-_UNTOLD = "not told by these trials"
+_THE_REST = "the hold of each force over a tick, or something else that the scene simulates"
+_UNTOLD = "not determined by these trials"
 _TRIED = "{cause}. Continued from the end of the run, the loop {trials}."
-_BY_BOOKS = "By the books of the whole run"
+_BY_BOOKS = "According to the books of the whole run"
 # The books of wall and elements are those of the commands, and the actuator has one of its own.
-_LIMITED = " That is by what was commanded: the actuator's limits kept {kept} of it back."
+_LIMITED = " That counts what was commanded: the actuator's limits kept {kept} of it back."
 _KEPT = 0.1
-_ELEMENT = "{when} {element} gave the device {energy}, more than the wall did."
+_ELEMENT = "{when}, {element} gave the device {energy}, more than the wall did."
 
 
 def likely_cause(summary: Summary) -> str:

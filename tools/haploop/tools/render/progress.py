@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # From the name of a stage and its number of parts to a function that is called after each part.
 Stage = Callable[[str, int], Callable[[], None]]
 _REFRESH_S = 0.1
-_JUDGING = "Over; held still and pushed, to be judged. Ctrl-C leaves it unjudged."
+_JUDGING = "Over; now held still and pushed, to be judged. Ctrl-C leaves it unjudged."
 # Lines of a stage where there is no terminal.
 _LINES = 10
 # Columns that all but the bar need, and the bar's bounds.

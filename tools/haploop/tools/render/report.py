@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from haploop.logger.summary import Summary
     from haploop.protocol.transport.wire import Message
 
-_ITS_WORD = "That the {} does what the scene says is its own word; haploop replay holds it against the scene."
+_ITS_WORD = "Only the {} itself says that it does what the scene says; haploop replay checks it against the scene."
 _TRIED = "a hold of {}, pushed by up to {}; haploop advise tries taps, other holds and devices"
 _NOTE = "A note on its scene: {first}"
-_NOTES = "{count} notes on its scene, of which the first: {first}"
+_NOTES = "{count} notes on its scene; the first: {first}"
 # Entries of the summary's window, their words, and what stands after the number. Peaks of two swings do not add.
 _OF_FORCE = {
     "force_swing_N": ("force", " peak to peak at its end"),
-    "force_ripple_N": ("force ripple", " peak to peak, of what is faster than 30 Hz alone"),
+    "force_ripple_N": ("force ripple", " peak to peak, above 30 Hz only"),
 }
 # Entry of the summary, the count in it, and its words.
 _COUNTS = (
@@ -142,7 +142,9 @@ def lateness_rows(of: Summary) -> list[tuple[str, str]]:
     if not (late := of.get("lateness")):
         return []
     if "ticks" not in late:
-        return [("answers came", "when is not told: the plant was to keep the time, but has said nothing of it")]
+        return [
+            ("answers came", "when is not known: the plant was to keep the time, but has reported nothing about it")
+        ]
     by = ("median_s", "(median)"), ("percent_99_s", "(99 %)"), ("most_s", "at most")
     words = ", ".join(f"{amount(late[key], 's')} {which}" for key, which in by)
     lost = f"; {amount(late['lost_s'], 's')} of real time lost" if late["lost_s"] else ""
@@ -226,7 +228,7 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     if (share := found.get("own_share")) is not None:
         beside = found.get("moved_beside", ("the hand's motion", "noise"))
         own = f"{100 * share:.0f} %" if share >= 0.01 else "less than 1 %"
-        rows.append(("of the oscillation", f"{own} its own; else {' or '.join([*beside, 'dying away'])}"))
+        rows.append(("of the oscillation", f"{own} its own; the rest: {' or '.join([*beside, 'dying away'])}"))
     if (settles_s := found.get("settles_s")) is not None:
         rows.append(("settles within", f"{amount(settles_s, 's')}, to 5 %"))
     if blown := found.get("blown"):
