@@ -102,7 +102,7 @@ def test_what_is_no_log_is_told_from_what_is_not_there(tmp_path: Path) -> None:
     log.write_bytes(b"")
     refused(export(tmp_path, "--to", "csv"), 1, "is empty")
     log.write_text("time,force\n", encoding="utf-8")
-    refused(export(tmp_path, "--to", "csv"), 1, "is no MCAP file")
+    refused(export(tmp_path, "--to", "csv"), 1, "is not an MCAP file")
     Log(log).close()
     refused(export(tmp_path, "--to", "csv"), 1, "holds no channel yet")
     assert [path.name for path in tmp_path.iterdir()] == ["log.mcap"]

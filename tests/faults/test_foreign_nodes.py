@@ -73,7 +73,7 @@ def test_however_a_foreign_controller_fails_the_run_ends_names_it_and_keeps_its_
 def test_a_run_so_short_that_nobody_waits_for_its_blocks_fails_where_they_are_missing(started: Started) -> None:
     run = started(node=f"{PLAIN} --misbehave mute", sets=("duration=0.5",))
     run.end(1)
-    assert "The controller has ended at tick 500, but its blocks reach tick" in run.stderr
+    assert "The controller has ended at tick 500, but its blocks reach only tick" in run.stderr
     assert json.loads((run.out_directory / "summary.json").read_text())["ended"] == "failed"
     run.leaves_nothing()
 

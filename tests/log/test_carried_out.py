@@ -115,7 +115,7 @@ def test_a_delay_that_is_not_set_beside_what_the_controller_did_ends_the_run() -
     seen.note(100, {"set": {DELAY: 0.003, "wall.stiffness": 200.0}})
     held = run(of).plant["command"].tobytes()
     seen.add_motion({"from_tick": 0, "columns": {"command": held}})
-    with pytest.raises(NodeError, match=r"clock.round_trip_delay = 0.003.* was refused: .* so the run cannot go on"):
+    with pytest.raises(NodeError, match=r"clock.round_trip_delay = 0.003.* was refused: .* so the run cannot continue"):
         seen.judge(300)
 
 

@@ -111,7 +111,7 @@ def test_a_chunk_that_is_missing_ends_the_reading_there(whole, tmp_path):
     path.write_bytes(whole[:at] + whole[at + 9 + length :])
     found = read(path)
     assert found["/plant"]["x"].size == 200
-    assert "message 20 of /plant should come" in found.cut
+    assert "message 20 of /plant was expected" in found.cut
 
 
 def test_the_checksums_are_those_of_the_mcap_format(whole):

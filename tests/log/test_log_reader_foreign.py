@@ -75,7 +75,7 @@ def test_what_is_no_log_is_refused_with_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="is empty"):
         read(tmp_path)
     log.write_bytes(b"t,x\n0.0,1.0\n")
-    with pytest.raises(LogError, match="is no MCAP file"):
+    with pytest.raises(LogError, match="is not an MCAP file"):
         read(tmp_path)
     with log.open("wb") as file:
         writer = Writer(file)
@@ -86,5 +86,5 @@ def test_what_is_no_log_is_refused_with_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="/image is cdr"):
         read(tmp_path)
     foreign(log, {"/words": [{"x": "one", "v": "two"}]})
-    with pytest.raises(LogError, match="/words is no msgpack map"):
+    with pytest.raises(LogError, match="/words is not a msgpack map"):
         read(tmp_path)

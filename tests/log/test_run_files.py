@@ -52,9 +52,9 @@ def test_a_number_changed_in_the_summary_is_refused_by_its_checksum(directory):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "is no JSON object that haploop wrote"),
-        ("[]", "is no JSON object that haploop wrote"),
-        ("[" * 100_000, "is no JSON object that haploop wrote"),
+        ("", "is not a JSON object that haploop wrote"),
+        ("[]", "is not a JSON object that haploop wrote"),
+        ("[" * 100_000, "is not a JSON object that haploop wrote"),
         ('{"ended": "done", "versions": {"haploop": "0.0.9"}}', "verdict is missing .* written by version 0.0.9"),
         ('{"ended": 3}', "ended is missing or of another type"),
     ],

@@ -70,7 +70,7 @@ def test_a_run_that_fails_is_undecided_in_its_summary_report_and_page_and_failed
             run_in_process(spec.scene, kinds, out=out / word, attachments=spec.attachments)
     summary = read(out / "undecided/summary.json")
     assert (summary["ended"], summary["verdict"]) == ("failed", "undecided")
-    assert summary["verdict_rule"].startswith("The run failed, and nothing tells how it would have gone on. From ")
+    assert summary["verdict_rule"].startswith("The run failed, and nothing shows how it would have continued. From ")
     assert shown(summary_table(summary)).startswith("undecided")
     assert words(make_figure(RunData.from_directory(out / "undecided")), "verdict") == ["failed"]
     session = cast(Any, SimpleNamespace(summary=summary, scene=spec.scene, outcome="failed"))

@@ -249,7 +249,7 @@ def test_a_finished_sweep_with_a_damaged_summary_is_told_so(tmp_path: Path, caps
     swept(tmp_path, axes, out=out)
     for text, sentence in (
         ("{}", "is not that of a sweep: it lacks cells"),
-        ("[", "is no JSON object that haploop wrote"),
+        ("[", "is not a JSON object that haploop wrote"),
     ):
         (out / "summary.json").write_text(text)
         with pytest.raises(SystemExit, match="1"):

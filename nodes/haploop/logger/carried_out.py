@@ -20,8 +20,8 @@ from haploop.protocol.transport.node import NodeError
 from haploop.protocol.transport.wire import Message
 
 _NO_DELAY = (
-    "The change at tick {}, {}, was refused: in the plant's telemetry the command of that tick does not act from the "
-    "step on at which this delay has it act."
+    "The change at tick {}, {}, was refused: in the plant's telemetry, the command of that tick does not take effect "
+    "at the step that follows from this delay."
 )
 
 
@@ -128,7 +128,7 @@ class Delays:
                 if is_seen and not acting[place] < change.tick <= acting[place + 1]:
                     why = _NO_DELAY.format(change.tick, change.describe())
                     if len(change.set) > 1:
-                        raise NodeError(f"{why} The rest of it is made, so the run cannot go on.")
+                        raise NodeError(f"{why} The rest of the change was made, so the run cannot continue.")
                     refused.append(replace(change, refused=why))
             self._held = held[-1]
         return refused

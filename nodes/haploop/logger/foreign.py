@@ -27,7 +27,7 @@ def complaint(frame: Frame, role: str, scene: Scene, time: Timebase) -> str:
     """Returns what is wrong with a STATE or block of a foreign plant or controller, as a sentence; "" for nothing."""
     message = frame.as_dict()
     if frame.name not in ("STATE", "END", f"{role.upper()}_BLOCK"):
-        return f"{frame.name} is no telemetry of a {role}, but came from it."
+        return f"{frame.name} is not telemetry of a {role}, but came from it."
     if frame.name == "STATE":
         wrong = _state(message["state"], role, scene)
     elif frame.name == "PLANT_BLOCK":
@@ -69,7 +69,7 @@ def _controller_block(block: Message, scene: Scene) -> str:
 def _columns(block: Message, names: tuple[str, ...], rows: int) -> str:
     columns = block["columns"]
     if block["ticks"] < 1 or block["from_tick"] < 0:
-        return f"it is of {block['ticks']} ticks"
+        return f"it has {block['ticks']} ticks"
     if missing := [name for name in names if name not in columns]:
         return f"it has no column {' and '.join(missing)}"
     for name, data in columns.items():
@@ -78,7 +78,7 @@ def _columns(block: Message, names: tuple[str, ...], rows: int) -> str:
         if len(data) != 8 * rows and not name.startswith(PIECES):
             return f"column {name} has {len(data) // 8} rows, but {rows} were expected"
         if name in _MOTION and not np.isfinite(as_float64(data)).all():
-            return f"column {name} holds what is no finite number"
+            return f"column {name} holds a value that is not a finite number"
     return ""
 
 
@@ -95,7 +95,7 @@ def _parts(block: Message, scene: Scene) -> str:
                 return f"element {index} has no {kind.__name__} for {key}"
         parameters = element["parameters"].items()
         if not all(isinstance(name, str) and isinstance(value, int | float | str) for name, value in parameters):
-            return f"a parameter of element {index} is neither number nor text"
+            return f"a parameter of element {index} is neither a number nor text"
     if len({element["book"] for element in elements}) < len(elements):
         return "two elements have the same book"
     return ""

@@ -38,8 +38,8 @@ _STATE_S = 15.0
 # How long a last block that was sent may be on its way.
 _LAST_MS = 100
 _NO_STATE = (
-    "No STATE of the {} came within {:g} s: it answers no second subscription, which ZeroMQ hands to it only with "
-    "ZMQ_XPUB_VERBOSE."
+    "No STATE of the {} came within {:g} s: it does not answer a second subscription, which ZeroMQ hands to it only "
+    "with ZMQ_XPUB_VERBOSE."
 )
 
 
@@ -109,7 +109,7 @@ class LoggerNode:
                     raise Aborted(_NO_STATE.format(missing, _STATE_S))
             self._client.poll()
             if (why := self._leave()) is not None:
-                raise Aborted(why or "The logger left before anything came.")
+                raise Aborted(why or "The logger left before it received anything.")
         controller = states["controller"]
         self.session.logger.start(states["plant"], controller["history"], controller["tick"])
         self._started = True
@@ -151,7 +151,7 @@ class LoggerNode:
         """Fails the run if a foreign program has ended without having sent all of its blocks."""
         end = min(tick for tick, *_ in self._ended.values())
         if self._tick < end:
-            why = f"The {self._streams.slowest} has ended at tick {end}, but its blocks reach tick {self._tick} only."
+            why = f"The {self._streams.slowest} has ended at tick {end}, but its blocks reach only tick {self._tick}."
             raise NodeError(why)
 
     @property

@@ -173,7 +173,7 @@ def read(path: Path) -> Summary:
     except OSError as error:
         why = (error.strerror or "it cannot be read").rstrip(".")
     except (ValueError, RecursionError, AttributeError, TypeError) as error:
-        raise LogError(f"The summary {path} is no JSON object that haploop wrote, or {why}.") from error
+        raise LogError(f"The summary {path} is not a JSON object that haploop wrote, or {why}.") from error
     raise LogError(f"The summary {path} cannot be used: {why}.")
 
 

@@ -130,7 +130,7 @@ def test_a_residual_is_not_laid_at_the_door_of_a_plant_that_is_ours_where_the_co
     whose = {roles: balance_words(-1.0, 2.0, roles).partition(" invents")[0] for roles in ((), ("controller",))}
     assert whose[()] == "This plant"
     assert whose[("controller",)].startswith("This controller")
-    assert balance_words(1.0, 2.0, ("plant", "controller")).startswith("Plant and controller together")
+    assert balance_words(1.0, 2.0, ("plant", "controller")).startswith("The pair of plant and controller")
 
 
 def test_a_controller_that_tells_other_forces_than_it_sent_is_what_the_books_of_our_plant_complain_of():
@@ -139,12 +139,12 @@ def test_a_controller_that_tells_other_forces_than_it_sent_is_what_the_books_of_
     controller = Controller(told, Timebase.from_scene(told), KINDS)
     controller.answer([(float(x),) for x in ran.plant["x"][:-1:10]])
     energy = booked(known, ran.plant, controller, ("controller",))["energy"]
-    assert energy["balance"].startswith("This controller, by what it says of its forces, ")
+    assert energy["balance"].startswith("This controller, by the forces that it reports, ")
     crude = with_value(known, "clock.integrator", "euler")
     controller = Controller(told, Timebase.from_scene(told), KINDS)
     controller.answer([(float(x),) for x in ran.plant["x"][:-1:10]])
     energy = booked(crude, ran.plant, controller, ("controller",))["energy"]
-    assert energy["balance"].startswith("Plant and controller together, by what they say of themselves, ")
+    assert energy["balance"].startswith("The pair of plant and controller, by what both report, ")
 
 
 def unmodelled(**more: Any) -> Scene:

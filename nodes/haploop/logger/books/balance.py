@@ -19,8 +19,8 @@ _IF = ", if its device and hand are those of the scene"
 _WHOSE = {
     (): ("This plant", ""),
     ("plant",): ("This plant", _IF),
-    ("controller",): ("This controller, by what it says of its forces,", ""),
-    ("controller", "plant"): ("Plant and controller together, by what they say of themselves,", _IF),
+    ("controller",): ("This controller, by the forces that it reports,", ""),
+    ("controller", "plant"): ("The pair of plant and controller, by what both report,", _IF),
 }
 
 

@@ -22,32 +22,32 @@ class Column(NamedTuple):
     meaning: str
 
 
-TIME = Column("s", "simulated time of the tick, from the start of the run on")
+TIME = Column("s", "simulated time of the tick, since the start of the run")
 # Positions, velocities and forces count along one axis, that of the scene.
 PLANT: Mapping[str, Column] = {
-    "timestamp": Column("s", "simulated time of the plant step, from the start of the run on"),
+    "timestamp": Column("s", "simulated time of the plant step, since the start of the run"),
     "t": Column("s", "the same number"),
-    "x": Column("m", "true position of the device, of the motor where there is a cable"),
+    "x": Column("m", "true position of the device, or of the motor if there is a cable"),
     "v": Column("m/s", "true velocity of the same body"),
     "tip_x": Column("m", "true position of the device's tip behind the cable"),
     "tip_v": Column("m/s", "true velocity of the tip"),
     "hand_x": Column("m", "true position of the hand's mass behind the grip"),
     "hand_v": Column("m/s", "true velocity of the hand's mass"),
     "force": Column(
-        "N", "force of the actuator from this step on: the command in effect, rounded and cut off as the actuator does"
+        "N", "force of the actuator from this step on: the command in effect, rounded and limited as the actuator does"
     ),
-    "actuator": Column("N", "force that the device feels at this step, where a bandwidth lets it lag behind `force`"),
+    "actuator": Column("N", "force that the device feels at this step, if a bandwidth makes it lag behind `force`"),
     "friction": Column(
-        "N", "dry friction on the device, or the motor, from this step on; against the motion, 0 while stuck"
+        "N", "dry friction on the device, or the motor, from this step on; opposes the motion, 0 while stuck"
     ),
 }
 CONTROLLER: Mapping[str, Column] = {
     "timestamp": TIME,
-    "x": Column("m", "measured position, with noise and whole counts: the sample that the tick answers"),
-    "v": Column("m/s", "velocity that the scene's estimator makes of the measured positions"),
+    "x": Column("m", "measured position, with noise and in whole counts: the sample that the tick answers"),
+    "v": Column("m/s", "velocity that the scene's estimator computes from the measured positions"),
     "a": Column("m/s^2", "acceleration, estimated, or the accelerometer's reading"),
     "wall": Column("N", "force of the wall that the controller computed at this tick; 0 out of contact"),
-    "total": Column("N", "the command: forces of the wall and of all elements; it acts later, by the delay"),
+    "total": Column("N", "the command: forces of the wall and of all elements; it takes effect later, by the delay"),
     "in_contact": Column("", "1 where the measured position lies strictly inside the wall, else 0"),
     "dissipation.N": Column("N", "force of element N in the list; 0 out of contact unless it acts always"),
 }
@@ -94,7 +94,7 @@ class Channels:
     def _plant_messages(self, first: int, ticks: int, samples: int, columns: dict[str, np.ndarray]) -> None:
         units = {name: PLANT[name].unit for name in ("timestamp", "t", *columns)}
         channel = self._log.channel(
-            "/plant", units, samples_per_message=samples, title="the plant at every step; force acts from it on"
+            "/plant", units, samples_per_message=samples, title="the plant at every step; force acts from that step on"
         )
         start = first * self._time.steps_per_tick
         t = np.arange(start, start + ticks * samples) / self._time.plant_rate

@@ -74,7 +74,7 @@ def demand_index(content: bytes) -> None:
     """Raises ValueError if this is no index of messages: a chunk with a flipped bit in its opcode may pass for one."""
     head = 6
     if len(content) != head + int.from_bytes(content[2:head], "little"):
-        raise ValueError("an index of messages is longer or shorter than it says")
+        raise ValueError("an index of messages is longer or shorter than it states")
 
 
 def lone_message(content: bytes) -> bytes:
@@ -145,6 +145,6 @@ class LogChannel:
                 columns = list(np.array(rows, np.float64).reshape(-1, len(units)).T)
         except (ValueError, TypeError, AttributeError, OverflowError) as error:
             what = f"of the numbers {', '.join(units)} of its schema" if units else "at all"
-            raise LogError(f"A message on {self.topic} is no msgpack map {what}.") from error
+            raise LogError(f"A message on {self.topic} is not a msgpack map {what}.") from error
         kept = ((name, column) for name, column in zip(units, columns, strict=True) if names is None or name in names)
         return np.repeat(log_times_ns, rows_each), Table(kept, units)

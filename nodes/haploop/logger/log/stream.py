@@ -107,7 +107,7 @@ class LogStream:
             raise LogError(f"The log {self.path} is empty: the run ended before anything was written to it.")
         if start != MAGIC:
             begins = f"it begins with {start!r}, not with {MAGIC!r}"
-            raise LogError(f"{self.path} is no MCAP file: {begins}. Give a run's directory or log.")
+            raise LogError(f"{self.path} is not an MCAP file: {begins}. Give a run's directory or log.")
 
     @property
     def cut(self) -> str:
@@ -170,7 +170,7 @@ class LogStream:
         elif opcode == Opcode.MESSAGE_INDEX:
             demand_index(content)
         elif opcode not in _PASSED_OVER and (self._counts is not None or opcode < _PRIVATE):
-            raise ValueError(f"a record of kind {opcode} is none of the data of a log")
+            raise ValueError(f"a record of kind {opcode} does not belong in a log")
         return []
 
     def _blame(self, what: str) -> None:
@@ -191,7 +191,7 @@ class LogStream:
                 self._register(*part)
                 continue
             if part.channel not in self._channels:
-                raise ValueError(f"a message of channel {part.channel} came before the channel")
+                raise ValueError(f"a message of channel {part.channel} came before its channel")
             topic = self._channels[part.channel].topic
             if self._counts is not None:
                 self._count(part, topic)
@@ -207,7 +207,7 @@ class LogStream:
         assert self._counts is not None
         before = self._counts.get(run.channel, 0)
         if run.sequence != before & 0xFFFFFFFF:
-            raise ValueError(f"message {before} of {topic} should come, but it is message {run.sequence}")
+            raise ValueError(f"message {before} of {topic} was expected, but message {run.sequence} came")
         self._counts[run.channel] = before + len(run.log_times_ns)
 
     def _register(self, opcode: int, content: bytes) -> None:
@@ -230,7 +230,7 @@ class LogStream:
             for topic, columns in ((known.topic, known.layout.columns) for known in self._channels.values()):
                 known = self.units.setdefault(topic, columns)
                 if bool(known) != bool(columns):
-                    raise LogError(f"The topic {topic} mixes messages with and without columns; read them apart.")
+                    raise LogError(f"The topic {topic} mixes messages with and without columns; read them separately.")
                 self.units[topic] = merge_columns(known, columns)
 
 

@@ -23,11 +23,14 @@ OF_WINDOW = {"steady": NO_SWING, "limit-cycle": SWINGING}
 UNTOLD = {
     "no tick": "The run ended before its first tick was done.",
     "short": f"Less than {WINDOW_S:g} s of the run was seen.",
-    "failed": "The run failed, and nothing tells how it would have gone on.",
+    "failed": "The run failed, and nothing shows how it would have continued.",
     "changed": "The loop was changed at {at_s:g} s, within the window from {from_s:g} s on, "
-    "which does not show it as it is now.",
+    "so the window does not show the loop as it is now.",
 }
-_SWINGING = f"; what is told as swinging does so {CROSSINGS} times or more, half as wide in the second half or wider."
+_SWINGING = (
+    f"; to be called swinging, it must do so {CROSSINGS} times or more, in the second half at least half as wide as in "
+    "the first."
+)
 _RULES = {
     "swings": "From {from_s:.6g} s on the position swung through the middle of its motion {times} times by more than "
     "{swing_um:.3g} µm, in the second half {growth:.2f} times as wide as in the first" + _SWINGING,
