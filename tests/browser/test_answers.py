@@ -43,7 +43,7 @@ def test_a_run_that_is_over_offers_nothing_live_and_says_whether_the_next_one_co
     expect(page.locator("#freeze")).to_have_text("Go live")
     stand_in.state(**ENDED)
     expect(page.locator("#freeze")).to_have_text("To its end")
-    expect(page.locator("#notice")).to_have_text("The run has ended. A run that is started now will come up here.")
+    expect(page.locator("#notice")).to_have_text("The run has ended. A run that is started now will appear here.")
     stand_in.tell(RUNS | {"stays": True})
     expect(page.locator("#notice")).to_have_text("The run has ended.")
 
@@ -168,7 +168,7 @@ def test_what_a_plant_of_somebody_elses_makes_of_the_energy_is_told_in_words(sta
     expect(page.locator("#summary .balance")).to_have_text(words)
     left_over = {**SUMMARY["energy"], "residual_J": None, "unmodelled_work_J": 2.5e-3}
     stand_in.state(**ENDED | {"summary": SUMMARY | {"energy": left_over, "trajectory_sha256": "cd" * 32}})
-    expect(page.locator("#summary")).to_contain_text("hand, by what is left over2.50 mJ")
+    expect(page.locator("#summary")).to_contain_text("hand, as the remainder2.50 mJ")
     expect(page.locator("#summary .balance")).to_be_hidden()
     expect(page.locator("#summary")).not_to_contain_text("residual")
 

@@ -59,7 +59,7 @@ def test_to_stop_is_asked_first_and_may_be_taken_back(stand_in, page):
     page.keyboard.press("Escape")
     expect(page.locator("#stopping")).to_be_hidden()
     page.click("#stop")
-    page.get_by_role("button", name="Go on").click()
+    page.get_by_role("button", name="Continue").click()
     assert stand_in.commands() == []
     page.click("#stop")
     assert order(stand_in, page, lambda: page.get_by_role("button", name="End the run").click()) == ("stop", {})

@@ -237,7 +237,7 @@ def test_a_slider_sets_when_it_is_let_go_and_shades_what_lies_beyond_the_limit(s
         "title", "Beyond 300 N/m the loop as it is now, without friction, quantisation and noise, is unstable."
     )
     told = page.locator("#set-fields p:has([id='set-wall.stiffness'])")
-    expect(told).to_contain_text("shaded: unstable, but for friction, quantisation and noise")
+    expect(told).to_contain_text("shaded: unstable if friction, quantisation and noise are left out")
     share = float(slider.evaluate("e => e.style.getPropertyValue('--safe')").rstrip("%"))
     assert share == pytest.approx(50 + 50 * 0.30103, abs=0.1), "log10 of 300 over 150"
     slider.focus()
@@ -261,7 +261,7 @@ def test_the_change_panel_has_both_sides_and_says_what_is_not_held(stand_in, pag
     expect(page.locator("#compare")).to_contain_text("Swap an element or set a number")
     after = {**table("after", 2.0, 1e-3, ("x", "m", "", t), ("force", "N", "", t)), **side}
     stand_in.show(with_header(snapshot(0.0, 2.0, after), change={"tick": 2000, "t_s": 2.0}))
-    expect(page.locator("#compare")).to_contain_text("not held any more")
+    expect(page.locator("#compare")).to_contain_text("no longer kept")
     before = {**table("before", 1.5, 1e-3, ("x", "m", "", t), ("force", "N", "", t)), **side}
     stand_in.show(with_header(snapshot(0.0, 2.0, before, after), change={"tick": 2000, "t_s": 2.0}))
     expect(page.locator("#compare")).not_to_contain_text("not held")

@@ -124,7 +124,7 @@ def test_an_unmodelled_hand_runs_with_a_plant_that_knows_it_and_claims_no_residu
     assert np.ptp(plant["x"]) > 1e-3
     assert "stability" not in of.summary
     text = shown(summary_table(of.summary), 80)
-    assert "work of the hand, by what is left over" in " ".join(text.split())
+    assert "work of the hand, as the remainder" in " ".join(text.split())
     assert "residual" not in text
     assert replay(of.out).differences == []
 

@@ -92,4 +92,4 @@ def test_where_nothing_came_of_the_plant_what_the_controller_logged_is_drawn(tmp
     [line, _] = artists(figure, "position")
     assert np.array_equal(line.get_ydata(), rows["x"] * 1e3)
     assert (data.as_measured, len(rows["x"]), book_rows(data, data.books())) == (" as measured", 100, [])
-    assert key_numbers(data) == ["nothing came of the plant: 0.1 s as the controller measured and commanded it"]
+    assert key_numbers(data) == ["nothing came from the plant: 0.1 s as the controller measured and commanded it"]

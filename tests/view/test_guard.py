@@ -98,7 +98,7 @@ async def test_a_verb_that_is_not_for_pages_is_refused():
         for verb in ("status", "options", "explode"):
             ok, text = await tab.ask(verb)
             assert not ok
-            assert "is no command" in text
+            assert "is not a command" in text
         assert runs.asked == []
 
 

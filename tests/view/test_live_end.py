@@ -37,7 +37,7 @@ def test_the_end_is_told_with_the_summary_and_what_was_seen_can_still_be_looked_
         assert np.isnan(x[5001:]).all()
         later = await here.tab()
         await later.phase("ended")
-        assert (await later.ask("pause"))[1].endswith("is over; nothing about it can change any more.")
+        assert (await later.ask("pause"))[1].endswith("is over; nothing in it can be changed any more.")
 
     follow(play, tmp_path, "duration=0.5", "wall.position=-0.001", pauses=(200,))
 

@@ -175,7 +175,7 @@ class Viewer:
     async def _read(self, run_id: str) -> RunSession:
         run = next((run for run in self._runs.past() if run.id == run_id), None)
         if run is None:
-            raise CommandFailed(f"There is no run {run_id[:40]!r} to be opened any more.")
+            raise CommandFailed(f"There is no run {run_id[:40]!r} that can still be opened.")
         try:
             return await asyncio.to_thread(PastSession, run)
         except (OSError, LogError, ValueError) as error:

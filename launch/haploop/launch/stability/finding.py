@@ -210,7 +210,7 @@ class Finding:
         width_um = 1e6 * self.width_m
         width = f"{1e-3 * width_um:.3g} mm" if width_um >= _FINE_UM else f"{width_um:.3g} µm"
         about_s = float(f"{numbers['needs_s']:.2g}")
-        run = f"a run of about {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
+        run = f"watching for about {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
         sentence = WHY[self.why].format(**numbers, width=width, width_um=width_um, run=run, decaying=self._decaying())
         sentence += AFTER_BLOW[self.blown].format(**numbers) if self.blown else ""
         sentence += AT_HARDEST[self.at_hardest].format(**numbers) if self.at_hardest else ""

@@ -20,12 +20,12 @@ _MOST_EVENTS = 1000
 WAITING = {"type": "state", "phase": "waiting", "why": "", "run": None, "options": None, "summary": None, "nodes": []}
 # What the page says where a run has ended without a verdict.
 _NO_VERDICT = {
-    "awaited": "It is gone through again, held still and pushed at its end, for its verdict. That "
-    "takes some seconds, longer for a device with a cable, a grip or friction.",
-    "abandoned": "Its launcher has ended without judging it: haploop judge does.",
-    "unjudged": "It was too long to be judged by itself: haploop judge does.",
-    "foreign": "Not all of it was haploop's own, so that nothing can hold it still and push it: this is what was seen.",
-    "unknown": "Its summary cannot be read from here, so that its verdict is not known.",
+    "awaited": "It is run again, held still and pushed at its end, for its verdict. That "
+    "takes a few seconds, longer for a device with a cable, a grip or friction.",
+    "abandoned": "Its launcher has ended without judging it: haploop judge can do that.",
+    "unjudged": "It was too long to be judged automatically: haploop judge can do that.",
+    "foreign": "Parts of it were foreign, so nothing can hold it still and push it: this is what was seen.",
+    "unknown": "Its summary cannot be read from here, so its verdict is not known.",
 }
 # Entries of the summary, of its window and of its energy; the logger's status has them side by side.
 _JUDGED = (

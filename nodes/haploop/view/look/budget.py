@@ -13,7 +13,7 @@ from haploop.view.store.history import EARLIER, TRUE, WALL_BOOK, History
 
 # Books of the plant in the order in which they are reported; labels of books that do not go by their own name.
 _STORED = ("kinetic", "spring", "actuator")
-_LABELS = {"unmodelled_work": "hand, by what is left over", EARLIER.removesuffix(TRUE): "earlier elements"}
+_LABELS = {"unmodelled_work": "hand, as the remainder", EARLIER.removesuffix(TRUE): "earlier elements"}
 # The wall's share by cause: label, the book it goes up to and the book it starts from.
 _OF_WALL = (
     ("sampling and hold", "sampled_and_held", "ideal"),

@@ -20,7 +20,7 @@ _SWINGS = ("dying away", "growing", "swinging")
 # force stays within this share of the largest.
 _REST, _RIPPLE, _LEAST_RIPPLE_N = 2.0 + 1e-6, 0.02, 1e-3
 _WHY = {
-    "settling": "Its numbers are those so far: no word before {window:g} s in one regime, since {begin}.",
+    "settling": "These are the numbers so far: no word before {window:g} s in one regime, since {begin}.",
     "no contact": "No tick of the last {window:g} s was in contact.",
     "swinging": "In the last {seen:.3g} s the position swung through the middle of its motion {crossings} times "
     "by more than {swing_um:.3g} µm.",
@@ -31,13 +31,13 @@ _WHY = {
     "over": "In the last {seen:.3g} s the position swung through the middle of its motion {crossings} times "
     "by more than {swing_um:.3g} µm; in the last {window:g} s it did not.",
     "moving": "In the last {seen:.3g} s the position moved by {width_um:.3g} µm and swung through the middle "
-    "of its motion {crossings} times: a push of the hand, or a swing slower than can be told.",
+    "of its motion {crossings} times: a push of the hand, or a swing too slow to be recognised.",
     "force ripples": "The position rests, but in the last {window:g} s the force rippled by {ripple_N:.3g} N.",
     "ripple over": "The position rests; in the last {seen:.3g} s the force rippled by {most_N:.3g} N, in the last "
     "{window:g} s by {ripple_N:.3g} N.",
-    "no swing seen": "In the last {seen:.3g} s the position stayed within {width_um:.3g} µm, the force in no "
-    "{window:g} s of them swung by more than {most_N:.3g} N about its straight trend. This says nothing of stability.",
-    "not finite": "A position or force is no finite number.",
+    "no swing seen": "In the last {seen:.3g} s the position stayed within {width_um:.3g} µm; in no {window:g} s of "
+    "them did the force swing by more than {most_N:.3g} N about its straight trend. This says nothing about stability.",
+    "not finite": "A position or force is not a finite number.",
 }
 
 
@@ -98,7 +98,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     lacking = np.flatnonzero(np.isnan(recent).any(axis=0))
     if len(lacking) and lacking[-1] < recent.shape[1] - 1:  # not received: what is no number stays so to the end
         begin = held + int(lacking[-1]) // n + 1
-        by = f"what is missing before {begin / rate:g} s"
+        by = f"the missing data before {begin / rate:g} s"
         recent = recent[:, (begin - held) * n :]
     so_far = end - begin < window
     first = max(begin, end - window)

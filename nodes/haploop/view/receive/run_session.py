@@ -135,7 +135,7 @@ class RunSession:
         if not self.outcome:
             self.end("ended", "")
             if self.summary is None:
-                self.end("failed", f"The launcher of run {self.run.id} has ended without a word.")
+                self.end("failed", f"The launcher of run {self.run.id} has ended without a message.")
 
     def close(self) -> None:
         """Leaves the run, which may go on, and closes its sockets."""

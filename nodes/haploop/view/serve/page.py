@@ -91,7 +91,7 @@ class Page:
         if not self._guard.may_steer(command.token):
             raise CommandFailed("This page only watches: open the link that haploop view printed to steer.")
         if command.verb not in _VERBS:
-            raise CommandFailed(f"{command.verb[:40]!r} is no command; these are: {', '.join(_VERBS)}.")
+            raise CommandFailed(f"{command.verb[:40]!r} is not a command; the commands are: {', '.join(_VERBS)}.")
         if command.verb in _OF_VIEWER:
             run_id = command.arguments.get("run")
             if not isinstance(run_id, str):
@@ -101,7 +101,7 @@ class Page:
         if session is None:
             raise CommandFailed("No run is live; start one with haploop run SCENE.")
         if session.outcome:
-            raise CommandFailed(f"Run {session.run.id} is over; nothing about it can change any more.")
+            raise CommandFailed(f"Run {session.run.id} is over; nothing in it can be changed any more.")
         return await session.clock.command(command.verb, command.arguments)
 
     async def _send_updates(self) -> None:

@@ -81,7 +81,7 @@ def make_app(viewer: Viewer, guard: Guard, heard: Heard, on_closed: Callable[[],
     async def only_by_name(request: web.Request, handler: Handler) -> web.StreamResponse:
         heard.add(request.protocol)
         if not guard.is_own_host(request.headers.get(hdrs.HOST)):
-            raise web.HTTPForbidden(text=f"This server answers at {guard.address} alone.")
+            raise web.HTTPForbidden(text=f"This server answers only at {guard.address}.")
         return await handler(request)
 
     async def protect(_: web.Request, response: web.StreamResponse) -> None:

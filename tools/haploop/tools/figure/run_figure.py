@@ -116,7 +116,7 @@ def key_numbers(run: RunData) -> list[str]:
     if not run.summary:
         return [f"{'log cut off' if run.cut else 'no summary'}: {last - first:g} s of {run.scene.duration:g} s"]
     if not run.summary["ticks"]:
-        return [f"nothing came of the plant: {last - first:g} s as the controller measured and commanded it"]
+        return [f"nothing came from the plant: {last - first:g} s as the controller measured and commanded it"]
     window, energy = run.summary["window"], run.summary["energy"]
     # The log of a run that failed may hold more than the window saw.
     from_s, to_s = window["from_s"], run.summary["duration_s"]

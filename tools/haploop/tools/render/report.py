@@ -47,7 +47,7 @@ LEAK_CAUSES = {"sampling_and_hold_J": "sampling and hold", "quantisation_J": "qu
 
 def plant_books(energy: Summary) -> dict[str, str]:
     """Returns the words for each key of the summary's ``energy`` that is a book of the plant: work, then every heat."""
-    words = {"hand_work_J": "work of the hand", "unmodelled_work_J": "work of the hand, by what is left over"}
+    words = {"hand_work_J": "work of the hand", "unmodelled_work_J": "work of the hand, as the remainder"}
     words |= {key: f"heat in the {key.removesuffix('_heat_J')}" for key in energy if key.endswith("_heat_J")}
     words |= {"friction_heat_J": "heat of friction", "actuator_J": "kept back by the actuator's limits"}
     return {key: name for key, name in words.items() if key in energy}

@@ -24,7 +24,7 @@ export class Sound {
     else this.context.suspend();
     byId("sound").setAttribute("aria-pressed", String(on));
     this.viewport.listen(on);
-    say({ ok: true, text: on ? "Sound is on: the force on the device, as fast as the run goes." : "" });
+    say({ ok: true, text: on ? "Sound is on: the force on the device, at the speed of the run." : "" });
   }
 
   /** Play what has come since the last time. */

@@ -3,7 +3,7 @@
 const FIRST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 2000;
 const LOST = "The connection to haploop view is lost, so nothing was sent.";
-const UNANSWERED = "The connection to haploop view was lost before the answer came; look whether it took effect.";
+const UNANSWERED = "The connection to haploop view was lost before the answer came; check whether it took effect.";
 
 /** The token of the link that haploop view printed; it is the part after the #, which no server ever sees. */
 const token = () => new URLSearchParams(location.hash.slice(1)).get("token") ?? "";

@@ -34,7 +34,7 @@ export class ComparePanel {
     const sides = SIDES.map((name) => tables[name]);
     const isThere = Boolean(change);
     for (const part of [this.sides, ...this.pictures, this.table]) part.hidden = !isThere;
-    put(this.about, isThere ? words(change, sides) : "Swap an element or set a number: what was before it and what comes of it stand here side by side.");
+    put(this.about, isThere ? words(change, sides) : "Swap an element or set a number: the loop before and after it is shown here side by side.");
     if (!isThere) return;
     TRACES.forEach(([name, , unit], i) => this.draw(this.pictures[i], sides.map((side) => side?.columns.find((c) => c.name === name)?.values), unit));
     this.fill(sides);
@@ -84,7 +84,7 @@ function power(side, name) {
 }
 
 function words({ tick }, [before, after]) {
-  const lost = before ? "" : " What was before it is not held any more.";
-  const short = after && !after.sight.so_far ? "" : " What is after it is less than half a second so far.";
+  const lost = before ? "" : " What was before it is no longer kept.";
+  const short = after && !after.sight.so_far ? "" : " So far, less than half a second is after it.";
   return `Tick ${tick}; watts below zero feed the device.${lost}${short}`;
 }

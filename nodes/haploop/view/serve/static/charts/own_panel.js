@@ -5,7 +5,7 @@ import { linesOf } from "../drawing/palette.js";
 import { times } from "../snapshot.js";
 import { TimeChart } from "./time_chart.js";
 
-const NOTHING = "No element showed a number of its own in this time.";
+const NOTHING = "No element showed columns of its own in this time.";
 
 export class OwnPanel {
   /** @param {HTMLElement} host takes the charts. @param {import("../viewport.js").Viewport} viewport what they change. */

@@ -12,11 +12,11 @@ const GRAMS = 1e3;
 const LEAST = [1e-5, 0.01];
 const DOT_PX = 3;
 const NOW_PX = 7;
-const COARSE = "Of this time only the least and greatest of each interval are kept here, so no loop of it; the log has every sample.";
+const COARSE = "For this time only the minimum and maximum of each interval are kept here, so no loop is drawn; the log has every sample.";
 const NONE_HERE = "No loop in this time.";
 const NO_CONTACT = "Not in contact in this time.";
 const NO_WALL = "No wall, so no loop of force and penetration.";
-const NO_INERTIA = "No virtual inertia at work, so no loop of momentum and velocity.";
+const NO_INERTIA = "No virtual inertia is active, so no loop of momentum and velocity.";
 const LINES = {
   pressing: { colour: "pressing", width: 1.5 },
   releasing: { colour: "releasing", width: 1.5, dash: [6, 2] },

@@ -77,7 +77,7 @@ export class SpectrumChart {
 
   words(lines, coarse) {
     for (const { name, side, said } of this.charts) put(said, lines ? `${side.label}, ${told(lines[name], side.unit)}` : side.label);
-    const missing = coarse ? "No spectrum: of this time only the least and greatest of each interval are kept here." : "Too few samples for a spectrum.";
+    const missing = coarse ? "No spectrum: for this time only the minimum and maximum of each interval are kept here." : "Too few samples for a spectrum.";
     put(this.note, lines ? `Amplitudes, ${lines.from_s.toFixed(2)} to ${lines.to_s.toFixed(2)} s.` : missing);
   }
 

@@ -27,7 +27,7 @@ export class Slider {
 
   /** Show the present number and its limit, in SI, or why none is known; no slider for a number that is not above zero. */
   show(value, limit = null, why = "") {
-    put(this.why, limit ? "shaded: unstable, but for friction, quantisation and noise" : why ? `no limit is shaded: ${why}` : "");
+    put(this.why, limit ? "shaded: unstable if friction, quantisation and noise are left out" : why ? `no limit is shaded: ${why}` : "");
     this.input.hidden = !(value > 0);
     if (this.input.hidden) return;
     if (!this.field.touched && (this.centre === 0 || Math.abs(Math.log10(value / this.centre)) > 0.7)) this.centre = value;

@@ -18,7 +18,7 @@ export const obstacle = (phase) => REASONS[phase] ?? (maySteer() ? "" : WATCHING
 export function allow(phase, why, stays = false) {
   const reason = obstacle(phase);
   for (const fieldset of document.querySelectorAll("fieldset[data-steers]")) fieldset.disabled = reason !== "";
-  const told = { waiting: "", ended: stays ? reason : `${reason} A run that is started now will come up here.` }[phase] ?? reason; // the middle of the page says that it waits
+  const told = { waiting: "", ended: stays ? reason : `${reason} A run that is started now will appear here.` }[phase] ?? reason; // the middle of the page says that it waits
   put(byId("notice"), [told, why && why[0].toUpperCase() + why.slice(1).replace(/[^.]$/, "$&.")].filter(Boolean).join(" "));
 }
 

@@ -4,7 +4,7 @@ import { plain } from "../drawing/amounts.js";
 import { byId, make, put } from "../dom.js";
 import { maySteer } from "../stream.js";
 
-const WATCHING = "Watching only: who has the link that haploop view printed chooses the run, for all pages.";
+const WATCHING = "Watching only: whoever has the link that haploop view printed chooses the run, for all pages.";
 
 export class RunChoice {
   /**

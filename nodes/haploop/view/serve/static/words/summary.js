@@ -47,7 +47,7 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
     ...(found.deeper ? { [`held ${amount(found.deeper_N, "N")} harder`]: found.deeper } : {}),
     ...(found.frictionless ? { "without its friction": found.frictionless } : {}),
     ...Object.fromEntries(Object.entries(found.without ?? {}).map(([part, does]) => [WITHOUT[part] ?? part, does])),
-    ...(isNumber(found.own_share) ? { "its own in the run's swing": share(found.own_share) } : {}),
+    ...(isNumber(found.own_share) ? { "its share of the run's swing": share(found.own_share) } : {}),
   };
 }
 
@@ -64,7 +64,7 @@ function figures({ duration_s, ended, extremes = {}, window = {}, real_time_fact
     // The ripple of the run itself: it includes noise and the hand, which the pushed copies do not have.
     ...(isNumber(window.force_ripple_N) ? { "its own ripple": `${amount(window.force_ripple_N, "N")} above 30 Hz` } : {}),
     "largest force": amount(extremes.force_max_N, "N"),
-    "real time": isNumber(factor) ? `${fixed(factor)}×${wasPaused ? ", its pauses in it" : ""}` : NONE,
+    "real time": isNumber(factor) ? `${fixed(factor)}×${wasPaused ? ", pauses included" : ""}` : NONE,
     "commands lost, dropped": `${lost.commands_lost ?? 0}, ${lost.commands_dropped ?? 0}`,
   };
 }
@@ -92,8 +92,8 @@ function books({ wall = {}, elements = [], moved_J: moved, residual_J: residual,
   for (const { kind, from_tick: from, to_tick: to, sampled_J, true_J } of elements) {
     rows.push([`${kind}, ticks ${from} to ${to}`, sampled_J, true_J]);
   }
-  const left = isNumber(unmodelled) ? ["hand, by what is left over", undefined, unmodelled] : ["residual", undefined, residual];
-  rows.push(["moved in all", undefined, moved], left);
+  const left = isNumber(unmodelled) ? ["hand, as the remainder", undefined, unmodelled] : ["residual", undefined, residual];
+  rows.push(["moved in total", undefined, moved], left);
   const cell = (value) => make("td", {}, value === undefined ? "" : amount(value, "J"));
   const body = rows.map(([name, ...numbers]) => make("tr", {}, make("th", { scope: "row" }, name), ...numbers.map(cell)));
   return make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body));
