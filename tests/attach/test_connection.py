@@ -109,7 +109,7 @@ def test_the_keys_of_another_run_are_told_from_a_key_that_is_not_known(keys, tmp
 @pytest.mark.parametrize("with_keys", [True, False])
 @pytest.mark.parametrize(
     ("says", "words"),
-    [(b"HTTP/1.0 400\r\n\r\n", "is no run of haploop"), (b"", "says nothing"), (None, "Nobody listens")],
+    [(b"HTTP/1.0 400\r\n\r\n", "is not a run of haploop"), (b"", "does not answer"), (None, "Nobody listens")],
 )
 def test_what_is_no_run_at_all_is_told_so(keys, says, words, with_keys, impatient):
     with socket.socket() as other:

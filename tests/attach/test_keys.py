@@ -71,7 +71,7 @@ def test_a_client_needs_two_files_and_its_copy_makes_no_keys_of_its_own(keys, tm
     [
         ("", 0o777, "is writable to others"),
         ("clients", 0o775, "is writable to others"),
-        ("controller.key_secret", 0o644, r"is open to others \(mode 0644\); mend it with chmod 600"),
+        ("controller.key_secret", 0o644, r"is open to others \(mode 0644\); repair it with chmod 600"),
     ],
 )
 def test_keys_that_others_can_read_or_replace_are_refused_with_the_way_to_mend_it(keys, name, mode, words):
@@ -92,7 +92,7 @@ def test_a_key_that_anybody_can_read_is_no_matter_where_it_is_public(keys):
 @pytest.mark.parametrize("name", ["plant.key_secret", "clients/client.key"])
 def test_a_file_that_is_no_certificate_is_named(keys, name, text):
     (keys / name).write_bytes(text.encode("latin-1"))
-    with pytest.raises(KeysError, match=rf"{name} (is no certificate|cannot be read)"):
+    with pytest.raises(KeysError, match=rf"{name} (is not a CURVE certificate|cannot be read)"):
         read_keys(keys, CLOCK)
 
 
@@ -116,7 +116,7 @@ def test_the_command_makes_keys_and_says_what_goes_to_another_host(tmp_path):
         (("status", "--keys", "somewhere"), "name its address with --at"),
         (("set", "wall.stiffness=1", "--at", "lab"), "--at must be a time"),
         (("status", "--at", "127.0.0.1:9", "--keys", "nowhere"), "There is no directory of keys nowhere"),
-        (("status", "--at", "host.invalid:9"), "is no host that is known here"),
+        (("status", "--at", "host.invalid:9"), "is not a host that is known here"),
         (("join", "nowhere.json"), "nowhere.json cannot be read"),
         (("join", __file__), "is not a file that haploop run --external"),
     ],

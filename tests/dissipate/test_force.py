@@ -179,7 +179,7 @@ def test_the_unit_of_the_force_comes_from_the_header_or_is_given(
 
 def test_a_unit_that_is_no_force_is_refused(tmp_path: Path) -> None:
     x = pressed()
-    with pytest.raises(RecordingError, match="'mm' is no unit for numbers in N"):
+    with pytest.raises(RecordingError, match="'mm' is not a unit for numbers in N"):
         booked(tmp_path / "wrong.csv", {"x": x, "F (mm)": x})
 
 

@@ -115,7 +115,7 @@ def test_a_scene_that_could_not_be_written_whole_is_not_left_behind():
         (
             "premium15",
             "no scene of that name comes with haploop. premium15 is a device: haploop advise "
-            "premium15 says which walls it bears, haploop new NAME.toml --device premium15 writes a scene with it.",
+            "premium15 says which walls it can hold, haploop new NAME.toml --device premium15 writes a scene with it.",
         ),
         ("elements", "comes with haploop. elements is a sweep: haploop sweep elements."),
         ("some/fig6c.toml", "There is no such file; did you mean fig6c?"),
@@ -213,7 +213,7 @@ def test_a_new_scene_takes_a_device_and_a_hand_of_ones_own_wherever_they_are():
     assert (scene.device.mass, scene.hand.mass) == (0.123, 0.2)
     refused = call("new", "other.toml", "--device", "nowhere.toml")
     assert refused.exit_code == 2
-    assert "'nowhere.toml' is no file, and none of that name comes with haploop" in refused.stderr
+    assert "'nowhere.toml' is not a file, and none of that name comes with haploop" in refused.stderr
 
 
 def test_a_new_scene_says_nothing_anew_that_a_file_of_ones_own_says():
@@ -228,7 +228,7 @@ def test_a_new_scene_says_nothing_anew_that_a_file_of_ones_own_says():
     assert scene.hand
     assert (scene.clock.round_trip_delay, scene.duration, scene.wall.stiffness) == (1e-3, 5.0, 700.0)
     assert scene.hand.force == Sine(amplitude=1.0, frequency=2.0)
-    assert '# round_trip_delay = "1 ms"  # of beneath.toml' in Path("my.toml").read_text()
+    assert '# round_trip_delay = "1 ms"  # from beneath.toml' in Path("my.toml").read_text()
     call("new", "asked.toml", "--device", "device.toml", "--wall", "2 N/mm")
     asked = load("asked.toml")
     assert asked.wall

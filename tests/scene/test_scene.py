@@ -119,7 +119,7 @@ def test_what_must_be_there_is_asked_for(key):
         (
             {"clock": {"plant_rate": 1500}},
             "clock.control_rate is 1000. The control_rate must divide plant_rate, but 1500 Hz is 1.5 times 1000 Hz; "
-            "legal and nearest are a control_rate of 750 Hz or 1500 Hz, or a plant_rate of 1000 Hz or 2000 Hz.",
+            "the nearest legal values are a control_rate of 750 Hz or 1500 Hz, or a plant_rate of 1000 Hz or 2000 Hz.",
         ),
         ({"run": {"log": "ticcs"}}, 'run.log is "ticcs"; did you mean ticks? Allowed: steps, ticks, none.'),
     ],
@@ -140,7 +140,9 @@ def test_a_table_without_a_known_kind_has_its_misspelt_keys_told_at_once(kind):
 def test_a_rate_that_does_not_divide_is_told_ones_that_do(plant, control):
     with pytest.raises(TimebaseError) as error:
         Timebase.from_clock(Clock(plant_rate=plant, control_rate=control), 1.0)
-    controls, plants = str(error.value).splitlines()[0].partition("legal and nearest")[2].split("a plant_rate of")
+    controls, plants = (
+        str(error.value).splitlines()[0].partition("the nearest legal values")[2].split("a plant_rate of")
+    )
     assert all(plant % int(rate) == 0 for rate in re.findall(r"\d+", controls))
     assert all(int(rate) % control == 0 for rate in re.findall(r"\d+", plants))
     assert "control_rate of" in controls

@@ -175,7 +175,7 @@ def test_what_goes_together_is_no_mistake():
         ({"accelerometer": {}}, ["[accelerometer] is not simulated, since no estimate reads it"]),
         (
             {"accelerometer": {"mount": "motor"}, "acceleration": {"source": "accelerometer"}},
-            ['accelerometer.mount = "motor" means the one mass there is'],
+            ['accelerometer.mount = "motor" means the only mass, since'],
         ),
         ({"accelerometer": {"mount": "motor"}}, ["[accelerometer] is not simulated"]),
         ({"accelerometer": {}, "acceleration": {"source": "accelerometer"}}, []),

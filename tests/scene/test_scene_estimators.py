@@ -34,19 +34,19 @@ def test_a_scene_that_names_one_resolves_to_si_numbers_and_to_itself():
             {"velocity": {"estimator": "foaw"}},
             [
                 "velocity.ticks is missing. The foaw estimator needs a whole number, at least 1 and at most 10000.",
-                "velocity.bound is missing. Without an [encoder] to take it from it must be a number in m, above 0, "
+                "velocity.bound is missing. Without an [encoder] to take it from, it must be a number in m, above 0, "
                 'or text with its unit such as "1 m".',
             ],
         ),
         (
             {"velocity": {"ticks": 3, "cutoff": 50.0}},
-            ["velocity.ticks is 3. It goes with the estimator window or foaw alone."],
+            ["velocity.ticks is 3. It is used only with the estimator window or foaw."],
         ),
         (
             {"velocity": {"estimator": "window", "ticks": 2, "bound": 1e-5, "jerk_density": 1.0}},
             [
-                "velocity.bound is 1e-05. It goes with the estimator foaw alone.",
-                "velocity.jerk_density is 1.0. It goes with the estimator kalman alone.",
+                "velocity.bound is 1e-05. It is used only with the estimator foaw.",
+                "velocity.jerk_density is 1.0. It is used only with the estimator kalman.",
             ],
         ),
         (
@@ -54,18 +54,18 @@ def test_a_scene_that_names_one_resolves_to_si_numbers_and_to_itself():
             [
                 "velocity.jerk_density is missing. The kalman estimator needs a number in m/s^3/Hz^0.5, above 0, "
                 'or text with its unit such as "1 m/s^3/Hz^0.5".',
-                "velocity.measurement_noise is missing. Without an [encoder] or [noise] to take it from it must be "
+                "velocity.measurement_noise is missing. Without an [encoder] or [noise] to take it from, it must be "
                 'a number in m, above 0, or text with its unit such as "1 m".',
             ],
         ),
         (
             {"velocity": KALMAN | {"accelerometer_noise": 1.0}},
-            ["velocity.accelerometer_noise is 1.0. It goes with accelerometer = true alone."],
+            ["velocity.accelerometer_noise is 1.0. It is used only with accelerometer = true."],
         ),
         (
             {"acceleration": {"source": "kalman"}, "encoder": ENCODER},
             [
-                'acceleration.source is "kalman". The filter that gives it is the velocity\'s, so velocity.estimator '
+                'acceleration.source is "kalman". It comes from the filter of the velocity, so velocity.estimator '
                 'must be "kalman" too.'
             ],
         ),
@@ -78,7 +78,7 @@ def test_a_scene_that_names_one_resolves_to_si_numbers_and_to_itself():
         ),
         (
             {"acceleration": {"source": "accelerometer", "estimator": "window", "ticks": 5}},
-            ['acceleration.estimator is "window". It goes with source = "encoder" alone.'],
+            ['acceleration.estimator is "window". It is used only with source = "encoder".'],
         ),
         (
             {"acceleration": {"estimator": "kalman"}},

@@ -46,7 +46,7 @@ def test_a_swap_may_add_one_past_the_end_and_none_moves_the_rest_up():
     remove = {"at": 0.2, "element": 0, "swap": {"kind": "none"}}
     assert mistakes(**with_events(add, remove, {"at": 0.3, "set": {"dissipation.0.mass": 0.1}})) == []
     assert mistakes(**with_events(remove, remove | {"at": 0.3})) == [
-        "event.1.element is 0. The scene has 0 elements then, counted from 0; one past the end adds one."
+        "event.1.element is 0. The scene has 0 elements at that time, counted from 0; one past the end adds one."
     ]
     assert len(mistakes(**with_events(add | {"element": 2}))) == 1
 
@@ -54,10 +54,13 @@ def test_a_swap_may_add_one_past_the_end_and_none_moves_the_rest_up():
 @pytest.mark.parametrize(
     ("event", "sentence"),
     [
-        ({"at": 1.0, "stop": True}, "event.0.at is 1.0. It must be at most 0.999 s, when the last tick of the run is."),
+        (
+            {"at": 1.0, "stop": True},
+            "event.0.at is 1.0. It must be at most 0.999 s, the time of the last tick of the run.",
+        ),
         ({"at": 0.5}, "event.0 changes nothing. An event has exactly one of swap, set, pause and stop."),
         ({"at": 0.5, "pause": False}, "event.0.pause is false. Allowed: true."),
-        ({"at": 0.5, "pause": True, "element": 0}, "event.0.element is 0. It goes with swap alone."),
+        ({"at": 0.5, "pause": True, "element": 0}, "event.0.element is 0. It is used only with swap."),
         ({"stop": True}, "event.0.at is missing. It must be a number in s, at least 0"),
         (
             {"at": 0.5, "set": {"wall.stifness": 1}},

@@ -166,10 +166,10 @@ def test_extends_is_a_path_or_a_list_of_them(files, extends):
         (b"", "The file is empty; a scene needs at least a duration and a [device]."),
         (b"# nothing but this\n", "The file is empty; a scene needs at least a duration and a [device]."),
         (b'# a\ntitle = "\xff"\n', ":2: A scene must be UTF-8 text, but this line is not; save the file as UTF-8."),
-        (b"a = 1\nb = = 2\n", ":2: This is not TOML: Invalid value (at line 2, column 5)."),
-        (b"a = 1\nb = [2,\n", ":2: This is not TOML: "),
-        (b"seed = " + 5000 * b"9", "This is not TOML: "),
-        (b"a = " + 5000 * b"[", "Tables and lists may lie at most 32 deep in one another."),
+        (b"a = 1\nb = = 2\n", ":2: This is not valid TOML: Invalid value (at line 2, column 5)."),
+        (b"a = 1\nb = [2,\n", ":2: This is not valid TOML: "),
+        (b"seed = " + 5000 * b"9", "This is not valid TOML: "),
+        (b"a = " + 5000 * b"[", "Tables and lists may be nested at most 32 deep."),
     ],
 )
 def test_a_file_that_cannot_be_read_says_why(tmp_path, monkeypatch, content, sentence):
@@ -215,7 +215,7 @@ def test_beside_a_file_that_is_absent_the_mistakes_of_the_others_are_told_and_no
 @pytest.mark.parametrize("value", ['"3 N/mm', "'3 N/mm", '["a", "b]', '"""3'])
 def test_a_quotation_mark_that_is_not_closed_is_told_in_words(files, value):
     [mistake] = file_mistakes(files(top=f"title = {value}\nseed = 1\n"))
-    assert mistake.endswith(" A quotation mark is not closed. Other mistakes are told once it is.")
+    assert mistake.endswith(" A quotation mark is not closed. Other mistakes are reported once it is.")
 
 
 def test_a_byte_order_mark_is_no_mistake(tmp_path):
@@ -255,7 +255,7 @@ def test_an_encoder_has_its_resolution_or_both_bits_and_range(files):
     said = file_mistakes(path, "encoder.counts=4096")
     assert any('counts over 0.2 m are bits = 12 and range = "0.2 m"' in each for each in said)
     path.write_text(COUNTED + "resolution = 1e-6\n")
-    assert file_mistakes(path)[0].startswith("top.toml:8: encoder.resolution stands beside bits or range.")
+    assert file_mistakes(path)[0].startswith("top.toml:8: encoder.resolution is given as well as bits or range.")
 
 
 def test_mistakes_come_by_line_and_a_wrong_duration_hides_none_of_the_clock(tmp_path):

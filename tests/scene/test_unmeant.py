@@ -33,9 +33,9 @@ CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"hand": PUSHED, "friction": {"kinetic": 80.0}}, {"hand": PUSHED, "friction": {"kinetic": 8.0}},
      "Dry friction of 80 N holds the device, which the hand pushes by 10 N at most"),
     ({"hand": HELD | {"force": {**FORCE, "value": -1.5e-3}}, "friction": {"kinetic": 0.048}, "device": THROWN},
-     {"hand": HELD, "friction": {"kinetic": 0.048}, "device": THROWN}, "hardly anything beside"),
+     {"hand": HELD, "friction": {"kinetic": 0.048}, "device": THROWN}, "is very small beside"),
     ({"hand": HELD | {"force": {**FORCE, "value": -1.5e-3}}, "wall": WALL, "device": THROWN},
-     {"hand": HELD, "wall": {**WALL, "position": -5e-3}, "device": THROWN}, "touches it in a swing at most"),
+     {"hand": HELD, "wall": {**WALL, "position": -5e-3}, "device": THROWN}, "touches it at most during a swing"),
     ({"hand": PUSHED, "wall": {"position": -60, "stiffness": 150}},
      {"hand": PUSHED, "wall": {"position": -0.06, "stiffness": 150}}, "The wall is at -60 m"),
     ({"hand": PUSHED | {"stiffness": 2000.0, "damping": 9.0}, "wall": WALL}, {"hand": PUSHED, "wall": WALL},
@@ -214,15 +214,15 @@ def test_a_change_of_a_wall_that_is_not_there_and_an_element_of_ones_own_are_tol
     with pytest.raises(SceneError, match=r"wall\.stifness cannot be set; did you mean wall.stiffness\? Allowed at"):
         scene(event=[{"at": 0.5, "set": {"wall.stifness": 100.0}}], wall=WALL)
     for tables in ({"dissipation": [{"kind": "brake"}]}, {"event": [{"at": 0.5, "swap": {"kind": "brake"}}]}):
-        with pytest.raises(SceneError, match="An element of yours comes with --plugin FILE"):
+        with pytest.raises(SceneError, match="An element of your own needs --plugin FILE"):
             scene(**tables)
 
 
 REPAIRS = {
     "duration = 0.0003": "the least legal value is 0.001 s",
-    "duration = 1,5": "A decimal has a point and no comma: 1.5.",
+    "duration = 1,5": "Write decimals with a point, not a comma: 1.5.",
     "duration = 2 ms": 'A number with its unit is text, in quotes: "2 ms".',
-    'duration = "0,3 s"': 'A decimal has a point and no comma: "0.3 s".',
+    'duration = "0,3 s"': 'Write decimals with a point, not a comma: "0.3 s".',
     "duration = 1.0\n[dissipation]\nkind='damping'": "It must be a list of tables: [[dissipation]], two",
     "": "haploop advise my.toml takes it as it is",
 }

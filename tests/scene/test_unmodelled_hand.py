@@ -19,7 +19,7 @@ from haploop.tools.cli.app import app
 SCENES = Path(__file__).parents[2] / "launch/scenes"
 FIG6B = SCENES / "fig6b.toml"
 UNMODELLED = "hand.kind=unmodelled"
-WHY = 'hand.kind is "unmodelled". What such a hand does no program here knows'
+WHY = 'hand.kind is "unmodelled". No program here knows what such a hand does'
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ def demand_regular(path: str | Path) -> os.stat_result:
     try:
         found = Path(path).stat()
     except ValueError as error:
-        raise OSError(errno.EINVAL, "A file's name holds no NUL character", str(path)) from error
+        raise OSError(errno.EINVAL, "A file name cannot contain a NUL character", str(path)) from error
     if stat.S_ISDIR(found.st_mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if not stat.S_ISREG(found.st_mode):
@@ -32,7 +32,7 @@ def read_file(path: str | Path, most_bytes: int = _MOST_BYTES) -> bytes:
     """Returns a file's content; raises OSError as ``demand_regular`` does, or if it is longer than ``most_bytes``."""
     size = demand_regular(path).st_size
     if size > most_bytes:
-        raise OSError(errno.EFBIG, f"It has {size} bytes, and {most_bytes} at most were expected", str(path))
+        raise OSError(errno.EFBIG, f"It has {size} bytes, but at most {most_bytes} were expected", str(path))
     return Path(path).read_bytes()
 
 

@@ -37,7 +37,7 @@ def not_loaded(name: str, place: str, group: str, error: Exception) -> PluginErr
     """Returns the error of an entry point that cannot be used; ``place`` is "module:object"."""
     return PluginError(
         f"An installed package names {name!r} ({place}) under {group}, which does not load: "
-        f"{type(error).__name__}: {error}. Mend that package, or uninstall it."
+        f"{type(error).__name__}: {error}. Repair or uninstall that package."
     )
 
 

@@ -37,7 +37,7 @@ def bring_file(path: Path) -> Brought:
     except OSError as error:
         raise PluginError(f"The plugin {path} does not load: {error.strerror}.") from error
     except UnicodeDecodeError as error:
-        why = f"line {line_of(error)} is not UTF-8 text; save it as such"
+        why = f"line {line_of(error)} is not UTF-8 text; save the file as UTF-8"
         raise PluginError(f"The plugin {path} does not load: {why}.") from error
     return bring_source(source, str(path))
 

@@ -86,9 +86,9 @@ class Quantity:
         if value > most and self.at_most is None and self.below is None:
             return f"must be at most {most:g} {self.unit}, which is {like}"
         if value < -most and self.at_least is None and self.above is None:
-            return f"must be at least {-most:g} {self.unit}, which is {like} to the other side"
+            return f"must be at least {-most:g} {self.unit}, which is {like} in the other direction"
         if self.above == 0 and value < least:
-            return f"must be at least {least:g} {self.unit}; with less, numbers of a loop overflow"
+            return f"must be at least {least:g} {self.unit}; with less, numbers in a loop overflow"
         return None
 
 

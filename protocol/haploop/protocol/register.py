@@ -51,7 +51,7 @@ class Register(Generic[Kind]):
             if entry.name == name:
                 return loaded(entry)
         raise UnknownKind(
-            f'There is no {self.what} "{name}" here. It comes from a plugin file, which --plugin FILE brings, or from '
+            f'There is no {self.what} "{name}" here. It comes from a plugin file, which needs --plugin FILE, or from '
             "a package, which must be installed."
         )
 

@@ -58,8 +58,8 @@ class Timebase:
             complaints.append(_not_whole(plant_rate, control_rate))
         elif plant_rate > _MOST_STEPS * control_rate:
             complaints.append(
-                f"plant_rate must be at most {_MOST_STEPS} times control_rate, since the steps of a tick are held at "
-                f"once, but {plant_rate} Hz is {plant_rate // control_rate} times {control_rate} Hz."
+                f"plant_rate must be at most {_MOST_STEPS} times control_rate, since all steps of a tick are in "
+                f"memory at once, but {plant_rate} Hz is {plant_rate // control_rate} times {control_rate} Hz."
             )
         delay_steps = whole_count(delay, plant_rate, "round_trip_delay", "plant steps", complaints)
         complaints += too_long("round_trip_delay", delay, control_rate)
@@ -68,8 +68,8 @@ class Timebase:
             complaints.append(f"duration must cover at least one control tick, {1 / control_rate:g} s.")
         if ticks > _MOST_TICKS:
             complaints.append(
-                f"duration must cover at most {_MOST_TICKS} control ticks, {_MOST_TICKS / control_rate:g} s, since no "
-                "run would come to its end."
+                f"duration must cover at most {_MOST_TICKS} control ticks, {_MOST_TICKS / control_rate:g} s, since a "
+                "longer run would not finish."
             )
         if complaints:
             raise TimebaseError("\n".join(complaints))
@@ -132,8 +132,8 @@ def _not_whole(plant_rate: int, control_rate: int) -> str:
     legal = [next((plant_rate // n for n in some if plant_rate % n == 0), 0) for some in counts]
     controls, plants = (" or ".join(f"{rate} Hz" for rate in some if rate) for some in (legal, rates))
     return (
-        f"control_rate must divide plant_rate, but {plant_rate} Hz is {times:.6g} times {control_rate} Hz; legal and "
-        f"nearest are a control_rate of {controls}, or a plant_rate of {plants}."
+        f"control_rate must divide plant_rate, but {plant_rate} Hz is {times:.6g} times {control_rate} Hz; the "
+        f"nearest legal values are a control_rate of {controls}, or a plant_rate of {plants}."
     )
 
 
@@ -175,7 +175,9 @@ def too_long(name: str, delay_s: float, control_rate: int) -> list[str]:
     if delay_s * control_rate <= _MOST_ON_THEIR_WAY:
         return []
     most_s = _MOST_ON_THEIR_WAY / control_rate
-    return [f"{name} must be at most {most_s:g} s at {control_rate} Hz: the commands on their way are held at once."]
+    return [
+        f"{name} must be at most {most_s:g} s at {control_rate} Hz: all commands on their way are in memory at once."
+    ]
 
 
 # With blocks that take no longer than this, a viewer, or the log of a killed run, is never far behind.

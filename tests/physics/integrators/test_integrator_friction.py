@@ -197,7 +197,7 @@ def test_friction_that_a_method_cannot_apply_is_a_mistake():
 
     assert at(2.44) == []
     assert len(at(2.46)) == 1
-    assert "does not brake them by rk4" in at(2.46)[0]
+    assert "With rk4, friction does not brake" in at(2.46)[0]
 
 
 def test_a_method_that_is_not_there_is_a_mistake_that_names_the_nearest():

@@ -224,10 +224,10 @@ def test_a_wall_whose_stiffness_changes_with_the_depth_has_no_limit_and_says_so(
     ("table", "said"),
     [
         ({"kind": "kelvin-voigt"}, "wall.damping is missing. A wall of the kind kelvin-voigt needs a number in N s/m"),
-        ({"damping": 1.0}, "wall.damping is 1.0. It goes with a wall of the kind kelvin-voigt alone."),
+        ({"damping": 1.0}, "wall.damping is 1.0. It is used only with a wall of the kind kelvin-voigt."),
         (
             {"kind": "texture", **OWN["kelvin-voigt"]},
-            "wall.damping is 3.0. It goes with a wall of the kind kelvin-voigt",
+            "wall.damping is 3.0. It is used only with a wall of the kind kelvin-voigt",
         ),
         (OWN["hunt-crossley"] | {"kind": "hunt-crossley", "exponent": 1.3}, "It must be a multiple of 0.25."),
         ({"kind": "hunt"}, 'wall.kind is "hunt". Allowed: spring, kelvin-voigt'),
@@ -250,7 +250,7 @@ def test_another_kind_laid_over_a_wall_keeps_where_and_how_stiff_it_is_and_drops
 
 def test_what_takes_the_wall_for_a_spring_refuses_any_other() -> None:
     coupling = {"kind": "virtual-coupling", "stiffness": 100.0, "mass": 0.01}
-    expected = 'It must be "spring" with the element virtual-coupling, which is told no more than a stiffness.'
+    expected = 'It must be "spring" with the element virtual-coupling, which is given only a stiffness.'
     assert any(expected in line for line in mistakes(wall=wall("texture"), dissipation=[coupling]))
     swap = {"at": 0.1, "swap": coupling}
     assert any(expected in line for line in mistakes(wall=wall("texture"), event=[swap]))

@@ -60,7 +60,7 @@ def _check_rate(draft: Draft, scene: Scene) -> None:
     from haploop.plant.integrators.stepwise import friction_brakes
 
     if not friction_brakes(scene):
-        expected = f"Friction on bodies that swing this fast does not brake them by {integrator}; raise it."
+        expected = f"With {integrator}, friction does not brake bodies that swing this fast; raise it."
         draft.complain(("clock", "plant_rate"), expected, f"is {rate} Hz")
 
 
@@ -86,7 +86,7 @@ def check_accelerometer(draft: Draft) -> None:
     if table is None:
         return
     if table.range is not None and table.resolution is not None and table.resolution > table.range:
-        expected = f"It must be at most accelerometer.range, {table.range:g} m/s^2; else every reading is 0."
+        expected = f"It must be at most accelerometer.range, {table.range:g} m/s^2; otherwise every reading is 0."
         draft.complain(("accelerometer", "resolution"), expected)
     _whole_steps(draft, ("accelerometer", "delay"), "delay of a reading", table.delay)
 
@@ -115,7 +115,7 @@ def note_accelerometer(scene: Scene) -> list[str]:
             'acceleration.source = "accelerometer" would, or velocity.accelerometer with the Kalman filter.'
         ]
     if value_at(scene, "accelerometer.mount") == "motor" and scene.transmission is None:
-        return ['accelerometer.mount = "motor" means the one mass there is without a [transmission].']
+        return ['accelerometer.mount = "motor" means the only mass, since there is no [transmission].']
     return []
 
 
@@ -139,8 +139,8 @@ def note_order(scene: Scene, kinds: Mapping[str, type[Element]]) -> list[str]:
     """Returns a note on each element that changes what stands before it and is not the last."""
     names = [table.name for table in scene.dissipation]
     return [
-        f"dissipation.{place} ({name}) changes the force of the wall and of what stands before it; "
-        f"dissipation.{place + 1} ({after}) stands after it and is not limited. Put what limits at the end."
+        f"dissipation.{place} ({name}) changes the force of the wall and of the elements before it; "
+        f"dissipation.{place + 1} ({after}) comes after it and is not limited. Put elements that limit at the end."
         for place, (name, after) in enumerate(pairwise(names))
         if name in kinds and kinds[name].limits
     ]

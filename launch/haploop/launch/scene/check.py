@@ -35,7 +35,7 @@ _TAGGED = {("hand", "force"), ("jitter",), ("dissipation", 0), ("event", 0, "swa
 # What may not be a mistake once the missing file is there.
 _ELSEWHERE = ("missing", "union_tag_not_found")
 _SOME_S = 1.0
-_OWN_KIND = " {} of yours comes with --plugin FILE."
+_OWN_KIND = " {} of your own needs --plugin FILE."
 # What a plugin file may bring, by the last keys of the place where it is named.
 _OWN: dict[KeyPath, str] = {
     ("wall", "kind"): "A wall",
@@ -168,7 +168,7 @@ def _timebase(layers: Layers, scene: Scene | None) -> Timebase | None:
 # What a scene says by other keys than data sheets use.
 _COUNTS = ' 4096 counts over 0.2 m are bits = 12 and range = "0.2 m", or resolution = "0.2 m / 4096".'
 _FORCE = (
-    " The force is cut off at saturation at every instant, however long: put there the peak force for taps, the "
+    " The force is cut off at saturation at every instant, however long it lasts: give the peak force for taps, the "
     "continuous force for walls that are pressed for long. Heat is not simulated."
 )
 _SAID_BY: dict[KeyPath, str] = {
@@ -236,7 +236,7 @@ def _complain_of_keys(layers: Layers, table: KeyPath, schema: Schema, rule: Sche
         if name not in keys:
             allowed = ", ".join(keys)
             layers.complain(
-                (*table, name), f"Keys of some kind: {allowed}.", "is a key of no kind", nearest(name, keys)
+                (*table, name), f"Keys of all kinds: {allowed}.", "is a key of no kind", nearest(name, keys)
             )
 
 
@@ -246,8 +246,8 @@ def _of_a_device(layers: Layers, key: KeyPath) -> str:
         return ""
     name = Path(layers.path).name
     return (
-        f" A file with a device alone is no scene: haploop advise {name} takes it as it is, and a scene takes it in by "
-        f'extends = ["{name}"].'
+        f" A file with only a device is not a scene: haploop advise {name} takes it as it is, and a scene includes it "
+        f'with extends = ["{name}"].'
     )
 
 

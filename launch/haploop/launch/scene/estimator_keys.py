@@ -21,7 +21,7 @@ def check_estimators(layers: Layers) -> None:
     _keys(layers, "velocity", velocity)
     _keys(layers, "acceleration", acceleration)
     if "accelerometer_noise" in velocity and velocity.get("accelerometer") is not True:
-        layers.complain(("velocity", "accelerometer_noise"), "It goes with accelerometer = true alone.")
+        layers.complain(("velocity", "accelerometer_noise"), "It is used only with accelerometer = true.")
     _acceleration(layers, acceleration, velocity)
 
 
@@ -51,7 +51,7 @@ def _keys(layers: Layers, name: str, table: Tables) -> None:
     for key in table:
         takers = [other for other, one in kinds.items() if key in (*one.needs, *one.takes)]
         if takers and estimator not in takers:
-            layers.complain((name, key), f"It goes with the estimator {' or '.join(takers)} alone.")
+            layers.complain((name, key), f"It is used only with the estimator {' or '.join(takers)}.")
     for key, sources in kind.needs_without.items():
         if key in table:
             continue
@@ -59,7 +59,7 @@ def _keys(layers: Layers, name: str, table: Tables) -> None:
             _missing(layers, name, key, f"The {estimator} estimator needs")
         elif not any(_gives(layers, source) for source in sources):
             tables = " or ".join(f"[{source}]" for source in sources)
-            _missing(layers, name, key, f"Without an {tables} to take it from it must be")
+            _missing(layers, name, key, f"Without an {tables} to take it from, it must be")
 
 
 def _gives(layers: Layers, source: str) -> bool:
@@ -78,9 +78,9 @@ def _gives(layers: Layers, source: str) -> bool:
 def _acceleration(layers: Layers, acceleration: Tables, velocity: Tables) -> None:
     source, estimator = acceleration.get("source", "encoder"), acceleration.get("estimator")
     if source != "encoder" and estimator is not None:
-        layers.complain(("acceleration", "estimator"), 'It goes with source = "encoder" alone.')
+        layers.complain(("acceleration", "estimator"), 'It is used only with source = "encoder".')
     if source == "kalman" and velocity.get("estimator") != "kalman":
-        expected = 'The filter that gives it is the velocity\'s, so velocity.estimator must be "kalman" too.'
+        expected = 'It comes from the filter of the velocity, so velocity.estimator must be "kalman" too.'
         layers.complain(("acceleration", "source"), expected)
 
 

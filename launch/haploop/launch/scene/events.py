@@ -72,11 +72,11 @@ def _check_shape(layers: Layers, key: KeyPath, event: Tables, time: Timebase | N
         given = f"has {' and '.join(verbs)}" if verbs else "changes nothing"
         layers.complain(key, "An event has exactly one of swap, set, pause and stop.", given)
     if "element" in event and "swap" not in event:
-        layers.complain((*key, "element"), "It goes with swap alone.")
+        layers.complain((*key, "element"), "It is used only with swap.")
     at = _read(event, "at")
     if time and time.first_tick_at(at) >= time.ticks:
         last = (time.ticks - 1) / time.control_rate
-        layers.complain((*key, "at"), f"It must be at most {last:g} s, when the last tick of the run is.")
+        layers.complain((*key, "at"), f"It must be at most {last:g} s, the time of the last tick of the run.")
 
 
 def _swap(layers: Layers, key: KeyPath, event: Tables, slots: list[Any]) -> None:
@@ -85,7 +85,9 @@ def _swap(layers: Layers, key: KeyPath, event: Tables, slots: list[Any]) -> None
     if element < len(slots) + (kind != NO_ELEMENT):
         slots[element : element + 1] = [] if kind == NO_ELEMENT else [kind]
     else:
-        expected = f"The scene has {counted(len(slots), 'element')} then, counted from 0; one past the end adds one."
+        expected = (
+            f"The scene has {counted(len(slots), 'element')} at that time, counted from 0; one past the end adds one."
+        )
         layers.complain((*key, "element"), expected, f"is {element}")
 
 
@@ -147,7 +149,7 @@ def _fixed(name: str, settable: dict[str, Number]) -> str:
     """Returns a sentence on the table of a key if nothing in that table of a scene changes in a run; "" otherwise."""
     table = name.partition(".")[0]
     is_fixed = table != name and hasattr(Scene, table) and not any(key.startswith(f"{table}.") for key in settable)
-    return f"Nothing of [{table}] changes in a run. " if is_fixed else ""
+    return f"Nothing in [{table}] changes during a run. " if is_fixed else ""
 
 
 def _nearest_key(name: str, settable: dict[str, Number]) -> str | None:

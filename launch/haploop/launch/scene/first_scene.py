@@ -15,15 +15,15 @@ from haploop.protocol.names import nearest
 from haploop.protocol.scene.table import Tables
 
 _TEXT = """\
-# A scene for haploop. What it does not say it takes from the files it extends; what they do not say is left out of the
-# simulation. `haploop check THIS --json` prints all of it, resolved; `haploop check --schema` every key there is.
+# A scene for haploop. Keys that are not set here come from the files it extends; what those do not set either is left
+# out of the simulation. `haploop check THIS --json` prints the resolved scene; `haploop check --schema` all keys.
 title = {title}
-extends = [{device}, {hand}]  # haploop scenes lists them; a file of yours is named by its path
+extends = [{device}, {hand}]  # `haploop scenes` lists them; name your own files by their path
 duration = 3.0  # s
 
 [clock]
-control_rate = 1000  # Hz, of the controller; the plant moves at 10 kHz
-round_trip_delay = "0 ms"  # from a sample to its force; a multiple of 0.1 ms
+control_rate = 1000  # Hz, of the controller; the plant runs at 10 kHz
+round_trip_delay = "0 ms"  # from a sample to the force that answers it; a multiple of 0.1 ms
 
 [hand.force]  # what the muscles do: press with 1 N, reached after 0.3 s
 kind = "ramp"
@@ -34,12 +34,12 @@ rise_time = "0.3 s"
 position = "-5 mm"  # below this the wall pushes back
 stiffness = {wall}
 
-# An element that takes energy out while the device is in the wall; haploop plugins lists them.
+# An element that takes energy out while the device is in the wall; `haploop plugins` lists all elements.
 # [[dissipation]]
 # kind = "damping"
 # damping = "1 N s/m"
 
-# A swap in mid-run; haploop swap does the same to a running loop.
+# A swap in mid-run; `haploop swap` does the same to a running loop.
 # [[event]]
 # at = "2 s"
 # swap = {{ kind = "unidirectional-inertia", mass = "2 g" }}
@@ -99,7 +99,7 @@ def _left_to_files(text: str, said: Layers) -> str:
             at = _table(said, table)
         elif key := re.match(r"(\w+) = ", line):
             if key[1] in at and key[1] not in ("title", "extends"):
-                line = f"# {key[1]} = {inline(at[key[1]])}  # of {Path(said.origin((*table, key[1]))).name}"
+                line = f"# {key[1]} = {inline(at[key[1]])}  # from {Path(said.origin((*table, key[1]))).name}"
             elif "kind" in at and table != ("wall",):
                 line = f"# {line}"
         lines.append(line)
@@ -123,7 +123,7 @@ def _source(option: str, name: str, kind: str) -> Path:
     meant = nearest(name, known)
     hint = f"; did you mean {meant}?" if meant else "."
     raise FirstSceneError(
-        f"{option} {name!r} is no file, and none of that name comes with haploop{hint} These do: {', '.join(known)}."
+        f"{option} {name!r} is not a file, and none of that name comes with haploop{hint} These do: {', '.join(known)}."
     )
 
 

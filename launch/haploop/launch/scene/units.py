@@ -26,7 +26,7 @@ def from_text(text: str, target: str) -> Decimal:
     """
     match = _TEXT.fullmatch(text)
     if not match and re.match(r"\s*[+-]?\d+,\d", text):
-        raise ValueError(f'A decimal has a point and no comma: "{text.replace(",", ".", 1)}".')
+        raise ValueError(f'Write decimals with a point, not a comma: "{text.replace(",", ".", 1)}".')
     if not match:
         quotient = f' or "0.2 {target} / 4096"' if target else ""
         raise ValueError(f'It must be a number and its unit, such as "1 {target or "%"}"{quotient}.')
@@ -61,7 +61,7 @@ def scale_of(unit: str, target: str) -> float:
         text = unit if unit[0] in "+-.0123456789" else f"1 {unit}"
         number = float(unit if is_number(unit) else from_text(text, target))
     except ValueError as error:
-        raise ValueError(f"{unit!r} is no unit for numbers in {target}: {error}") from error
+        raise ValueError(f"{unit!r} is not a unit for numbers in {target}: {error}") from error
     if not math.isfinite(number) or not number:
         raise ValueError(f"A unit cannot be {number:g} {target}.")
     return number

@@ -12,8 +12,8 @@ _KIND = "unmodelled"
 # What takes or stores energy between the held force and the hand in a way that the device's rows do not show.
 _NEED_A_MODEL = ("clock.integrator", "transmission", "friction", "actuator.bandwidth", "accelerometer.bandwidth")
 _CANNOT_MOVE = (
-    "What such a hand does no program here knows, so the device can be neither moved nor judged: only a run whose "
-    "plant is a program of yours can have it (haploop run --node plant=COMMAND, or --external plant)."
+    "No program here knows what such a hand does, so the device can be neither moved nor judged: only a run whose "
+    "plant is your own program can have it (haploop run --node plant=COMMAND, or --external plant)."
 )
 
 
@@ -30,7 +30,7 @@ def check_hand(draft: Draft) -> None:
     for key in _NEED_A_MODEL:
         if value_at(draft.data, key) not in (None, "exact"):
             expected = "What it does to the energy is known only where the hand is modelled; leave one of them out."
-            draft.complain(tuple(key.split(".")), expected, "stands beside an unmodelled hand")
+            draft.complain(tuple(key.split(".")), expected, "is given with an unmodelled hand")
 
 
 def demand_modelled(layers: Layers, scene: Scene) -> Scene:

@@ -32,7 +32,7 @@ def check_wall(layers: Layers) -> None:
     for key in table:
         takers = [other for other, kind in walls.items() if key in kind.keys]
         if takers and name not in takers:
-            layers.complain(("wall", key), f"It goes with a wall of the kind {' or '.join(takers)} alone.")
+            layers.complain(("wall", key), f"It is used only with a wall of the kind {' or '.join(takers)}.")
 
 
 def with_defaults(scene: Scene) -> Scene:
@@ -49,5 +49,5 @@ def check_spring(layers: Layers, scene: Scene, kinds: Mapping[str, type[Element]
         return
     for element in elements_of(scene):
         if "wall_stiffness" in kinds[element.name].asks:
-            expected = f'It must be "spring" with the element {element.name}, which is told no more than a stiffness.'
+            expected = f'It must be "spring" with the element {element.name}, which is given only a stiffness.'
             layers.complain(("wall", "kind"), expected)

@@ -20,7 +20,7 @@ class Noise(Table):
 class Accelerometer(Table):
     """A real accelerometer in place of the ideal one: whatever the table leaves out is ideal."""
 
-    range: Annotated[float | None, si("m/s^2", "largest reading to either side", above=0)] = None
+    range: Annotated[float | None, si("m/s^2", "largest reading in either direction", above=0)] = None
     resolution: Annotated[float | None, si("m/s^2", "one count", above=0)] = None
     noise_density: Annotated[float, si("m/s^2/Hz^0.5", "density of its white noise", at_least=0)] = 0.0
     bandwidth: Bandwidth | None = None
@@ -56,8 +56,8 @@ class Grip(Table):
 
 
 _SATURATION = (
-    "largest force to either side at every instant; of a data sheet the peak force for taps, the continuous force for "
-    "walls that are pressed for long: heat is not simulated"
+    "largest force in either direction at every instant; from a data sheet the peak force for taps, the continuous "
+    "force for walls that are pressed for long: heat is not simulated"
 )
 
 

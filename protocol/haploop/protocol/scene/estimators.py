@@ -20,17 +20,17 @@ class Velocity(OpenTable):
     estimator: str | None = None
     ticks: Ticks = None
     bound: Annotated[
-        float | None, si("m", "how far samples may lie off a line; one count of the encoder without it", above=0)
+        float | None, si("m", "how far samples may lie off a line; one count of the encoder by default", above=0)
     ] = None
     fit: Fit | None = None
-    jerk_density: Annotated[float | None, si("m/s^3/Hz^0.5", "density of the jerk that is expected", above=0)] = None
+    jerk_density: Annotated[float | None, si("m/s^3/Hz^0.5", "density of the expected jerk", above=0)] = None
     measurement_noise: Annotated[
-        float | None, si("m", "standard deviation of a position; that of encoder and noise without it", above=0)
+        float | None, si("m", "standard deviation of a position; that of encoder and noise by default", above=0)
     ] = None
     accelerometer: bool | None = None
     accelerometer_noise: Annotated[
         float | None,
-        si("m/s^2", "standard deviation of a reading; that of the accelerometer without it", at_least=0, at_most=1e9),
+        si("m/s^2", "standard deviation of a reading; that of the accelerometer by default", at_least=0, at_most=1e9),
     ] = None
     cutoff: Cutoff | None = None
 

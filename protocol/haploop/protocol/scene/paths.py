@@ -98,5 +98,5 @@ def _default(table: Table, name: str) -> Any:
     if field is None:
         return None
     if field.default is dataclasses.MISSING:
-        raise ValueError(f"{type(table).__name__} cannot be without {name}.")
+        raise ValueError(f"{type(table).__name__} must have {name}.")
     return field.default

@@ -46,12 +46,12 @@ def address_to_reach(text: str) -> str:
     host, port = _split(text.removeprefix("tcp://"))
     if not host or not port or not host.isprintable() or set(host) & set("/@ "):
         raise TransportError(
-            f"The address of a run is that which haploop run --tcp names, such as 192.0.2.7:5550, but {text!r} came."
+            f"The address of a run is the one that haploop run --tcp names, such as 192.0.2.7:5550, but {text!r} came."
         )
     try:
         found = socket.getaddrinfo(host, _port(port, 65535, text), type=socket.SOCK_STREAM)[0][4]
     except (OSError, UnicodeError) as error:
-        raise TransportError(f"{host} is no host that is known here; its numeric address would do.") from error
+        raise TransportError(f"{host} is not a host that is known here; use its numeric address.") from error
     return f"tcp://[{found[0]}]:{found[1]}" if ":" in str(found[0]) else f"tcp://{found[0]}:{found[1]}"
 
 
@@ -90,8 +90,8 @@ def _refuse_taken(host: str, port: int, ports: int) -> None:
             trial.bind((host, port))
     except OSError as error:
         if error.errno == errno.EADDRNOTAVAIL:
-            raise TransportError(f"{host} is no address of this machine.") from error
+            raise TransportError(f"{host} is not an address of this machine.") from error
         raise TransportError(
-            f"Port {port} at {host} cannot be bound ({error.strerror}); a run takes {ports} ports in a row: name "
-            "others, or none for any that are free."
+            f"Port {port} at {host} cannot be bound ({error.strerror}); a run takes {ports} consecutive ports: name "
+            "others, or none to use any that are free."
         ) from error

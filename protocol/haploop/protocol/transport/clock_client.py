@@ -27,7 +27,7 @@ REPORT_MS = 200
 _JOIN_S = 20.0
 _LOOK_MS = 250
 _GRACE_S = 2.0
-_LOST = "Nothing has come from the run at {} for {:g} s: the network between is cut, or its launcher was ended."
+_LOST = "Nothing has come from the run at {} for {:g} s: the network connection is cut, or its launcher was ended."
 _PROGRAM = {"name": "haploop"}
 
 

@@ -22,22 +22,22 @@ _EVENTS = (
 _TOLD_AFTER_S, _SILENCE_AFTER_S = 2.0, 5.0
 
 _UNKNOWN_KEY = (
-    "The run at {} refuses this key: it is none of its clients', or was made anew since. "
+    "The run at {} refuses this key: it is not a key of its clients, or was replaced since. "
     "Copy client.key_secret from its keys."
 )
 _OTHER_KEYS = (
-    "The program at {} broke the handshake off: clock.key is not that of its keys, or it has no keys, or it is no run "
-    "of haploop. Copy clock.key and client.key_secret from the keys of this run; leave out --keys if it has none."
+    "The program at {} broke off the handshake: clock.key does not belong to its keys, or it has no keys, or it is not "
+    "a run of haploop. Copy clock.key and client.key_secret from the keys of this run; leave out --keys if it has none."
 )
-_NEEDS_KEYS = "The run at {} is guarded by keys, or it is no run of haploop; name a copy of its keys with --keys."
-_HAS_NO_KEYS = "The run at {} has no keys, or it is no run of haploop; leave out --keys if you meant it."
-_NO_RUN = "What answers at {} is no run of haploop; look at the port."
-_SILENT = "What listens at {} says nothing: it is no run of haploop, or the network loses most of what is sent."
+_NEEDS_KEYS = "The run at {} is guarded by keys, or it is not a run of haploop; name a copy of its keys with --keys."
+_HAS_NO_KEYS = "The run at {} has no keys, or it is not a run of haploop; leave out --keys if this is the run you mean."
+_NO_RUN = "What answers at {} is not a run of haploop; check the port."
+_SILENT = "What listens at {} does not answer: it is not a run of haploop, or the network loses most of what is sent."
 _NOBODY = (
-    "Nobody listens at {}: the run there has ended, it is in a network of its own (as that of a container), or the "
-    "address is wrong."
+    "Nobody listens at {}: the run there has ended, it is in a separate network (such as that of a container), or "
+    "the address is wrong."
 )
-_NO_ANSWER = "Nothing comes back from {}: the host is off, there is no way to it, or a firewall holds it back."
+_NO_ANSWER = "Nothing comes back from {}: the host is off, there is no route to it, or a firewall blocks it."
 
 
 class Connection:

@@ -57,7 +57,7 @@ def make_keys(directory: Path) -> list[str]:
         if (directory / f"{CLOCK}.key").exists() and not _secret_of(directory, CLOCK).exists():
             raise KeysError(
                 f"{directory} holds {CLOCK}.key without its secret, as a client's copy does: "
-                "keys are made on the host of the run, in a directory of their own."
+                "make keys on the host of the run, in a separate directory."
             )
         made = [holder for holder in _HOLDERS if _make_pair(directory, holder)]
         for holder, path in ((CLOCK, directory / f"{CLOCK}.key"), (CLIENT, directory / CLIENTS / f"{CLIENT}.key")):
@@ -116,7 +116,7 @@ def _pair(directory: Path, holder: str) -> tuple[str, str]:
     public, secret = _load(path)
     _refuse_open(path, 0o077, "open")
     if secret is None:
-        raise KeysError(f"{path} holds a public key alone; its secret is missing.")
+        raise KeysError(f"{path} holds only a public key; its secret is missing.")
     return public, secret
 
 
@@ -137,7 +137,7 @@ def _load(path: Path) -> tuple[str, str | None]:
     except OSError as error:
         raise KeysError(f"{path} cannot be read: {error.strerror or error}.") from error
     except (ValueError, KeyError, LookupError) as error:
-        raise KeysError(f"{path} is no certificate of CURVE; take it away and make or copy it anew.") from error
+        raise KeysError(f"{path} is not a CURVE certificate; remove it and make or copy it again.") from error
     return public.decode(), secret.decode() if secret else None
 
 
@@ -151,4 +151,4 @@ def _refuse_open(path: Path, bits: int, how: str) -> None:
     mode = path.stat().st_mode & 0o777
     if mode & bits:
         closed = mode & ~(bits | 0o022)
-        raise KeysError(f"{path} is {how} to others (mode {mode:04o}); mend it with chmod {closed:o} {path}.")
+        raise KeysError(f"{path} is {how} to others (mode {mode:04o}); repair it with chmod {closed:o} {path}.")

@@ -242,7 +242,7 @@ def bind(socket: zmq.Socket[bytes], directory: Path, name: str) -> str:
             "set XDG_RUNTIME_DIR to a shorter directory."
         )
     if path.exists():
-        raise OSError(f"The socket {path} is there already; another process of this run has bound it.")
+        raise OSError(f"The socket {path} exists already; another process of this run has bound it.")
     address = f"ipc://{path}"
     socket.bind(address)
     return address

@@ -47,7 +47,7 @@ def decode(data: bytes) -> Frame:
     try:
         items = msgpack.unpackb(data, strict_map_key=False)
     except Exception as error:  # msgpack raises many kinds, RecursionError among them
-        raise WireError(f"A frame of {len(data)} bytes is no msgpack: {type(error).__name__}.") from error
+        raise WireError(f"A frame of {len(data)} bytes is not msgpack: {type(error).__name__}.") from error
     if not isinstance(items, list) or len(items) < 2:
         raise WireError(f"A frame must be an array [version, code, fields...], but is {type(items).__name__}.")
     version, code, *fields = items

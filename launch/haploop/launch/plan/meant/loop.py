@@ -123,12 +123,12 @@ LOOP = (
         _ideal_accelerometer,
         "acceleration",
         "An estimate reads an accelerometer that no table describes, so it is ideal: no noise, no counts, no delay. "
-        "[accelerometer] gives it those of a real one.",
+        "An [accelerometer] table gives it those of a real one.",
     ),
     Rule(
         _begins_deep,
         "wall.position",
-        "The device begins {depth_mm:.3g} mm deep in the wall, which throws it out with {force_N:.3g} N at once; "
+        "The device begins {depth_mm:.3g} mm deep in the wall, which at once pushes it out with {force_N:.3g} N; "
         "device.position, wall.position or wall.occupies may be the other way round.",
     ),
     Rule(

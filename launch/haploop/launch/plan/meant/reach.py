@@ -156,7 +156,7 @@ REACH = (
         _pushed_by_nothing,
         "device",
         "Nothing moves the device: the hand has no force and no stretched spring, the device no velocity at the start, "
-        "and it begins outside the wall. [hand.force] would push it, device.velocity throw it.",
+        "and it begins outside the wall. [hand.force] would push it, device.velocity would throw it.",
         keeps_off=True,
     ),
     Rule(
@@ -169,7 +169,7 @@ REACH = (
     Rule(
         _feeble_beside_friction,
         "hand.force",
-        "The hand's largest force, {force_N:.3g} N, is hardly anything beside the device's dry friction of "
+        "The hand's largest force, {force_N:.3g} N, is very small beside the device's dry friction of "
         "{friction_N:.3g} N: it does not press a device that has come to rest. Is that the unit that was meant?",
         keeps_off=True,
     ),
@@ -177,7 +177,7 @@ REACH = (
         _beyond_the_end,
         "wall.position",
         "The wall is at {position_m:g} m; a run ends as diverged beyond {most_m:g} m (diverged_beyond), before the "
-        "device is there. Is that the unit that was meant?",
+        "device gets there. Is that the unit that was meant?",
         keeps_off=True,
     ),
     Rule(
@@ -198,7 +198,7 @@ REACH = (
         _not_held_there,
         "wall.position",
         "The hand's force holds the device {reach_mm:.4g} mm from its spring's rest, and the wall is {way_mm:.4g} mm "
-        "from there: the device touches it in a swing at most.",
+        "from there: the device touches it at most during a swing.",
         keeps_off=True,
     ),
 )

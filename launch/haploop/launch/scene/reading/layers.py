@@ -138,7 +138,7 @@ def _read(layers: Layers, path: Path, chain: tuple[Path, ...]) -> None:
     here = Path(os.path.realpath(path))  # where links lead in a circle, reading the file says so
     layers.files += 1
     if len(chain) > DEEPEST or layers.files > _MOST_FILES:
-        many = f"At most {DEEPEST} files that extend one another, and {_MOST_FILES} in all, were expected."
+        many = f"At most {DEEPEST} files may extend one another, and at most {_MOST_FILES} in all."
         if layers.files <= _MOST_FILES + 1:
             layers.mistakes.append(Mistake(shown(path), "", "", many))
         return
@@ -190,7 +190,7 @@ def lay_overrides(layers: Layers, overrides: Iterable[str]) -> None:
         name, value = split_assignment(text) or ("", None)
         path = key_path(name)
         if not path:
-            expected = "It must read KEY=VALUE with a dotted key, such as dissipation.0.mass=0.02."
+            expected = "It must have the form KEY=VALUE with a dotted key, such as dissipation.0.mass=0.02."
             layers.mistakes.append(Mistake(COMMAND_LINE, _shortened(text), "cannot be read", expected))
         elif complaint := lay_value(layers, path, value):
             layers.mistakes.append(Mistake(COMMAND_LINE, name, "cannot be set", complaint))
@@ -204,7 +204,7 @@ def lay_value(layers: Layers, path: Sequence[str], value: Any) -> str | None:
         if isinstance(node, list):
             if not part.isdecimal() or int(part) > len(node):
                 count = counted(len(node), "element")
-                return f"{'.'.join(map(str, key))} has {count}, counted from 0, so {part} is none of them."
+                return f"{'.'.join(map(str, key))} has {count}, counted from 0, so {part} is not one of them."
             step: Any = int(part)
             if step == len(node):
                 node.append({})

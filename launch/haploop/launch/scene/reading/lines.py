@@ -123,7 +123,7 @@ def _statements(text: str) -> Iterator[tuple[int, str, Tables]]:
         yield begun, statement, given
         held = []
     if held:
-        raise ValueError(f"What begins in line {begun} is no TOML.")
+        raise ValueError(f"What starts in line {begun} is not valid TOML.")
 
 
 def _names(header: Any) -> list[str]:

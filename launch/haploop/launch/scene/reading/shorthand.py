@@ -19,7 +19,7 @@ class CountedRange(Table):
     """The range of an encoder and its bits, in place of its resolution, which is range / 2^bits."""
 
     bits: Annotated[int, si("", "there are 2^bits counts over the range", whole=True, at_least=1, at_most=64)]
-    range: Annotated[float, si("m", "way that the counts cover", above=0)]
+    range: Annotated[float, si("m", "distance that the counts cover", above=0)]
 
 
 def put_in_full(layers: Layers) -> None:
@@ -43,7 +43,7 @@ def _count_range(layers: Layers) -> None:
         except PydanticCustomError as error:
             layers.complain(("encoder", name), error.message() + _of_a_count(name, encoder[name]))
     if "resolution" in encoder:
-        layers.complain(("encoder", "resolution"), expected, "stands beside bits or range")
+        layers.complain(("encoder", "resolution"), expected, "is given as well as bits or range")
     count_m = read["range"] / 2 ** read["bits"] if len(read) == 2 else encoder.get("resolution", 1.0)
     given = next((name for name in names if name in encoder), "resolution")
     layers.lay({"resolution": count_m}, layers.origin(("encoder", given)), ("encoder",))

@@ -54,7 +54,7 @@ def parse(
         problem = f"A {what} must be UTF-8 text, but this line is not; save the file as UTF-8."
     except ValueError as error:
         line = _line_of(str(error), text)
-        problem = f"This is not TOML: {error}.{_hint(str(error), text)} Other mistakes are told once it is."
+        problem = f"This is not valid TOML: {error}.{_hint(str(error), text)} Other mistakes are reported once it is."
     except RecursionError:
         problem = _TOO_DEEP
     raise SceneError([Mistake(shown(path), "", "", problem, line=line)])
@@ -76,7 +76,7 @@ def _hint(problem: str, text: str) -> str:
     written = text.splitlines()[int(line[1]) - 1] if line else ""
     value = written.partition("=")[2].partition("#")[0].strip()
     if re.fullmatch(r"[+-]?\d+,\d+", value):
-        return f" A decimal has a point and no comma: {value.replace(',', '.')}."
+        return f" Write decimals with a point, not a comma: {value.replace(',', '.')}."
     if re.fullmatch(r"[+-]?\d[\d.,]*\s*[^\W\d][\w */^.]*", value):
         return f' A number with its unit is text, in quotes: "{value.replace(",", ".")}".'
     return ""
@@ -100,7 +100,7 @@ def _with_the_first(path: Path, text: str, doubled: list[Mistake]) -> Tables | N
 _OTHERS = {
     "scenes": "{0} is a scene: haploop run {0}.",
     "sweeps": "{0} is a sweep: haploop sweep {0}.",
-    "devices": "{0} is a device: haploop advise {0} says which walls it bears, haploop new NAME.toml --device {0} "
+    "devices": "{0} is a device: haploop advise {0} says which walls it can hold, haploop new NAME.toml --device {0} "
     "writes a scene with it.",
     "hands": "{0} is a hand: haploop new NAME.toml --hand {0} writes a scene with it.",
 }
@@ -117,7 +117,7 @@ def _absent(path: Path, what: str) -> str:
     return " ".join([f"There is no such file{hint}{f'; did you mean {meant}?' if meant else '.'}", *told])
 
 
-_TOO_DEEP = f"Tables and lists may lie at most {DEEPEST} deep in one another."
+_TOO_DEEP = f"Tables and lists may be nested at most {DEEPEST} deep."
 
 
 def excess(value: Any) -> str:
@@ -129,7 +129,7 @@ def excess(value: Any) -> str:
         if depth > DEEPEST:
             return _TOO_DEEP
     keys = _count_keys(value)
-    return f"There are {keys} keys, and {_MOST_KEYS} at most were expected." if keys > _MOST_KEYS else ""
+    return f"There are {keys} keys, but at most {_MOST_KEYS} were expected." if keys > _MOST_KEYS else ""
 
 
 def _count_keys(value: Any) -> int:

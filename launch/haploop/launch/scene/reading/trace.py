@@ -26,7 +26,7 @@ def read_trace(path: Path) -> tuple[list[float], list[float]]:
         rows = list(csv.reader(read_text(path).splitlines()))
     except UnicodeDecodeError as error:
         line = line_of(error)
-        raise TraceError(f"The recording must be UTF-8 text, but line {line} is not; save it as such.") from error
+        raise TraceError(f"The recording must be UTF-8 text, but line {line} is not; save it as UTF-8.") from error
     except OSError as error:
         raise TraceError(f"The recording cannot be read: {error.strerror}.") from error
     except csv.Error as error:
