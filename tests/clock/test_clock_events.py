@@ -151,6 +151,6 @@ def test_what_is_put_on_record_keeps_its_place_among_the_events() -> None:
 
 def test_a_swap_that_was_taken_back_happened_at_its_own_tick_and_all_else_when_it_is_on_record() -> None:
     back = Change.from_dict(52, {"swap": {"kind": "damping", "damping": 1.0, "acts": "always"}, "element": 0})
-    assert happened_at(75, restoration(back, "It is taken back.", 35, None)) == 52
+    assert happened_at(75, restoration(back, "The swap is taken back.", 35, None)) == 52
     for event in ({"pause": True}, refusal(back.refuse(ValueError("no"), "")), {"restored": "x"}):
         assert happened_at(75, event) == 75

@@ -93,7 +93,7 @@ def test_undo_brings_back_the_code_before_a_reload_and_one_taken_back_is_told_at
     undone = run.ask("undo")["tick"]
     plugin.write_text(source(at_force="1 / (self.tick < 50)"))
     tick = run.ask("swap", **SWAP, reload=True)["tick"]
-    words = rf"gave no force at tick {tick + 50}: ZeroDivisionError: .* \(brake.*, line \d+\)\. It is taken back"
+    words = rf"gave no force at tick {tick + 50}: ZeroDivisionError: .* \(brake.*, line \d+\)\. The swap is taken back"
     wait_for("the sentence, while the run goes on", lambda: re.search(words, run.stderr))
     plugin.write_text(source(at_force="1 / (self.tick < 0)"))
     with pytest.raises(run_directory.CommandRefused, match=r"ZeroDivisionError: .* \(brake.*, line \d+\)"):

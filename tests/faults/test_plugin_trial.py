@@ -57,7 +57,7 @@ def test_whatever_a_file_does_to_the_process_it_is_tried_in_is_a_sentence(statem
 
 @pytest.mark.parametrize("force", ["nan", "inf", "-inf"])
 def test_an_element_whose_force_at_rest_is_not_finite_is_refused_before_a_run_takes_it_up(force):
-    with pytest.raises(ElementError, match=f"brake gave {force}, no finite force"):
+    with pytest.raises(ElementError, match=f"brake gave {force}, not a finite force"):
         tried(source(at_force=f"return float('{force}')"))
 
 
@@ -113,7 +113,7 @@ def test_a_default_that_its_own_declaration_does_not_allow_is_refused(default, s
 
 @pytest.mark.slow
 def test_a_unit_that_nobody_knows_is_refused_and_one_that_is_not_usual_is_not():
-    with pytest.raises(PluginError, match="damping of Brake is declared in 'N s/furlongz', which is no unit"):
+    with pytest.raises(PluginError, match="damping of Brake is declared in 'N s/furlongz', which is not a unit"):
         tried(source().replace("N s/m", "N s/furlongz"))
     assert "brake" in tried(source().replace("N s/m", "V s/inch"))
 

@@ -136,7 +136,9 @@ def test_a_force_that_never_returns_is_named_with_element_tick_and_line_after_th
     run = started(running, brake, "import threading, time\n" + ELEMENT.format(at_150=hang), sets=(BRIEF,))
     run.end(1)
     run.leaves_nothing()
-    assert "Element 0 (brake) gave no force at tick 150: DeadlineOver: it did not come to an end before" in run.stderr
+    assert (
+        "Element 0 (brake) gave no force at tick 150: DeadlineOver: it did not finish within run.deadline" in run.stderr
+    )
     assert "Stack (most recent call first)" not in run.stderr
     assert "/plugins/brake-" in run.stderr
     assert "Traceback" not in run.stderr

@@ -86,7 +86,7 @@ def test_an_element_without_a_docstring_is_not_described_by_its_signature():
 def test_a_kind_by_which_books_could_not_be_told_apart_is_refused(kind):
     """Books of a second damping are called damping-2, and an account's sides are told after a dot."""
     source = f"from haploop.controller.dissipation import Element\n\nclass One(Element):\n    kind = {kind!r}\n\n"
-    with pytest.raises(PluginError, match=r"kind of One in one\.py is .* its books are called by it"):
+    with pytest.raises(PluginError, match=r"kind of One in one\.py is .* its books are named by it"):
         load_source(source + "    def force(self, motion):\n        return 0.0\n", "one.py")
 
 

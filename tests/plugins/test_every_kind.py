@@ -202,9 +202,9 @@ def line_of(code: str, text: str) -> int:
         ("    does: ClassVar", "    done: ClassVar", "class AlphaBeta", "line {1} does not say what its estimate is"),
         ("x, v = memory", "x, v, a = memory", "x, v, a =", "alpha-beta could not estimate .*own.py, line {1}"),
         ("t % self.every", "t / 0 * self.evry", "t / 0", "The hand force pulses could not give .*own.py, line {1}"),
-        ("self.value, 0.0)", "self.value, 0.0)[0]", "[0]", r"The hand force pulses gave an array of the shape \(\)"),
-        ("        d = self.thickness", "        d = 1 / 0", "1 / 0", "not tell what it has stored .*own.py, line {1}"),
-        ("0.25 * depth * depth, beneath)", "float('inf'), 1.0)", "inf", "skin gave inf, which is no finite number"),
+        ("self.value, 0.0)", "self.value, 0.0)[0]", "[0]", r"The hand force pulses gave an array of shape \(\)"),
+        ("        d = self.thickness", "        d = 1 / 0", "1 / 0", "not give its stored energy .*own.py, line {1}"),
+        ("0.25 * depth * depth, beneath)", "float('inf'), 1.0)", "inf", "skin gave inf, which is not a finite number"),
     ],
 )  # fmt: skip
 def test_what_is_missing_or_raises_is_told_with_file_and_line(
@@ -221,7 +221,7 @@ def test_what_does_not_come_to_an_end_is_told_with_file_and_line(tmp_path: Path)
     scene, plugin = with_all(
         tmp_path, ALL.replace("        d = self.thickness", "        while True:\n            d = 1")
     )
-    with pytest.raises(PluginError, match=r"it did not come to an end within 2 s \(own.py, line \d+\)"):
+    with pytest.raises(PluginError, match=r"it did not finish within 2 s \(own.py, line \d+\)"):
         load(scene, plugins=[plugin])
 
 

@@ -69,7 +69,7 @@ def test_what_is_no_finite_number_is_taken_back_in_the_first_second_and_told_wit
     assert summary["ended"] == "done"
     [why] = summary["not_made"]
     assert why.startswith(f"Element 0 ({kind}) gave no force at tick 350: {told(GIVEN[name])}")
-    assert why.endswith("It is taken back: element 0 becomes damping (damping 0.3).")
+    assert why.endswith("The swap is taken back: element 0 becomes damping (damping 0.3).")
     by_hand = scene([DAMPING], {"at": 0.1, "swap": {"kind": "fine", "acts": "always"}}, {"at": 0.35, "swap": DAMPING})
     assert summary["trajectory_sha256"] == run_in_process(by_hand, KINDS)["trajectory_sha256"]
     log = read(tmp_path)
@@ -120,5 +120,5 @@ def test_a_member_of_a_batch_whose_new_element_fails_ends_the_batch():
     controller = Controller(one, Timebase.from_scene(one), KINDS | {"fine": KINDS["inf"]})
     controller.schedule(0, one.event[0].as_dict())
     x = np.array([0.001, 0.002])
-    with pytest.raises(ElementError, match="A force of a member is no finite number"):
+    with pytest.raises(ElementError, match="A force of a member is not a finite number"):
         controller.answer([(x,)] * 300)  # pyright: ignore[reportArgumentType]

@@ -228,7 +228,7 @@ def test_a_new_element_that_raises_in_its_first_second_gives_way_to_the_last_one
     assert why.startswith(
         "Element 0 (raises) gave no force at tick 350: ValueError: enough (test_own_elements.py, line "
     )
-    assert why.endswith("It is taken back: element 0 becomes damping (damping 0.3).")
+    assert why.endswith("The swap is taken back: element 0 becomes damping (damping 0.3).")
     assert [(each["kind"], each["from_tick"]) for each in summary["energy"]["elements"]] == [
         ("damping", 0), ("raises", 100), ("damping", 350),
     ]  # fmt: skip

@@ -155,7 +155,10 @@ def test_what_stands_after_an_element_that_limits_is_noted_and_nothing_else_is()
         ('clock.round_trip_delay = "1.55 ms"', 'is "1.55 ms". The round_trip_delay must be a whole number'),
         ('clock.round_trip_delay = "1.55 ms"', "With clock.plant_rate = 20000 it is 31 of them."),
         ('event = [{ at = 0.5, swap = "damping" }]', 'a table, such as { kind = "damping", damping = 0.8 }.'),
-        ('event = [{ at = 0.5, set = { "hand.stiffnes" = 3 } }]', "cannot be set. Nothing in [hand] changes during a run."),
+        (
+            'event = [{ at = 0.5, set = { "hand.stiffnes" = 3 } }]',
+            "cannot be set. Nothing in [hand] changes during a run.",
+        ),
         ("actuator.continuous = 3.0", "the continuous force for walls that are pressed for long"),
     ],
 )  # fmt: skip

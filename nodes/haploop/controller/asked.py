@@ -78,7 +78,9 @@ def shown(memory: Any, names: Sequence[str]) -> list[float]:
         return [float(getattr(own, name)) for name in names]
     except (AttributeError, TypeError, ValueError) as error:
         what = f"{type(error).__name__}: {error}"
-        raise ElementError(f"The log is to show {' and '.join(names)} of its memory, numbers; {what}.") from error
+        raise ElementError(
+            f"The log shows {' and '.join(names)} of its memory, which must be numbers; {what}."
+        ) from error
 
 
 def answer_of(

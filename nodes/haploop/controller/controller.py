@@ -182,7 +182,7 @@ class Controller:
             change, self.params, state = take_back(place, before, self.params, state, self.tick)
             self._reloaded = tuple(each for each in self._reloaded if each[:2] != (since, plugin))
             self.recorder.open(self.params)
-            sentence = f"{why} It is taken back: {change.describe()}."
+            sentence = f"{why} The swap is taken back: {change.describe()}."
             self.recorder.restored.append(restoration(change, sentence, since, plugin))
             try:
                 after, row = tick(self.params, state, sample)

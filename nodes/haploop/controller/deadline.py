@@ -32,5 +32,5 @@ def heed_deadline() -> None:
 def _give_up(_number: int, frame: FrameType | None) -> None:
     while frame is not None:
         if frame.f_code in _CALLERS:
-            raise DeadlineOver("it did not come to an end before run.deadline was over")
+            raise DeadlineOver("it did not finish within run.deadline")
         frame = frame.f_back

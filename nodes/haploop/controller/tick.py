@@ -82,7 +82,7 @@ def demand_finite(params: ControllerParams, row: list[Any], since: int) -> None:
     if is_finite is True or (is_finite is not False and is_finite.all()):
         return
     if getattr(is_finite, "ndim", 0):
-        raise ElementError("A force of a member is no finite number.")
+        raise ElementError("A force of a member is not a finite number.")
     place = next((place for place, value in enumerate(row[:-2]) if not math.isfinite(value)), 0) - len(MOTION_COLUMNS)
     if place >= 0 and (swapped := params.elements[place].swapped) and swapped[0] >= since:
         raise NoForce(place) from ValueError(

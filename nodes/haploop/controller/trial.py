@@ -101,7 +101,9 @@ def _check_unit(unit: str, where: str) -> None:
     try:
         pint.UnitRegistry().parse_units(unit)
     except Exception as error:  # what a parser of arbitrary text raises is not documented
-        raise PluginError(f'{where} is declared in {unit!r}, which is no unit; write one such as "N s/m".') from error
+        raise PluginError(
+            f'{where} is declared in {unit!r}, which is not a unit; write one such as "N s/m".'
+        ) from error
 
 
 def _make(elements: list[tuple[str, dict[str, float]]], kinds: dict[str, type[Element]]) -> Reply:
@@ -119,7 +121,7 @@ def _make(elements: list[tuple[str, dict[str, float]]], kinds: dict[str, type[El
                 what = raised(error, type(element))
                 raise ElementError(f"The element {kind} gave no force when it was tried at rest: {what}.") from error
             if not finite:
-                what = f"{force}, no finite force, when it was tried at rest{place_in(type(element))}"
+                what = f"{force}, not a finite force, when it was tried at rest{place_in(type(element))}"
                 raise ElementError(f"The element {kind} gave {what}.")
     return {"made": len(elements)}
 

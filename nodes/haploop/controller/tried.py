@@ -37,7 +37,7 @@ def try_kinds(scene: Scene) -> None:
         for depth in (*_DEPTHS_M, np.array(_DEPTHS_M)):  # as in the controller, and as in the books
             of = f"at {'an array of depths' if isinstance(depth, np.ndarray) else f'a depth of {depth:g} m'}"
             _tried(what, f"push {of}", lambda depth=depth: wall.push(depth, 0.0 * depth))
-            _tried(what, f"tell what it has stored {of}", lambda depth=depth: wall.stored(depth))
+            _tried(what, f"give its stored energy {of}", lambda depth=depth: wall.stored(depth))
     for of in ("velocity", "acceleration"):
         if is_of_file(Estimator.group, name := scene.estimate(of).estimator):
             _tried(f"The estimator {name}", "estimate", lambda of=of: _estimate(scene, of))
@@ -57,7 +57,7 @@ def _try_force(force: HandForce) -> None:
         values = _tried(what, "give the force at an array of times", lambda times=times: force.force_at(times))
         if np.shape(values) != times.shape:
             raise PluginError(
-                f"{what} gave an array of the shape {np.shape(values)} for times of the shape {times.shape}; force_at "
+                f"{what} gave an array of shape {np.shape(values)} for times of shape {times.shape}; force_at "
                 "must return one force for each time."
             )
 
@@ -70,7 +70,7 @@ def _in_time() -> Iterator[None]:
         return
 
     def interrupt(*_: object) -> None:
-        raise TimeoutError(f"it did not come to an end within {_LIMIT_S:g} s")
+        raise TimeoutError(f"it did not finish within {_LIMIT_S:g} s")
 
     before = signal.signal(signal.SIGALRM, interrupt)
     signal.setitimer(signal.ITIMER_REAL, _LIMIT_S)
@@ -90,5 +90,5 @@ def _tried(what: str, do: str, call: Callable[[], Any]) -> Any:
         why = raised_in_file(error) or f"{type(error).__name__}: {error}"
         raise PluginError(f"{what} could not {do} when it was tried: {why}.") from error
     if not is_fine:
-        raise PluginError(f"{what} gave {value}, which is no finite number, when it was to {do}.")
+        raise PluginError(f"{what} gave {value}, which is not a finite number, when it had to {do}.")
     return value

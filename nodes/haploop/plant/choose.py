@@ -35,7 +35,7 @@ def make_motion(scene: Scene, time: Timebase, members: int | None = None) -> Any
     The integrator of a batch is exact. Raises ValueError for an unmodelled hand.
     """
     if hand_is_unmodelled(scene):
-        raise ValueError("An unmodelled hand cannot be moved: only a plant of somebody else's runs such a scene.")
+        raise ValueError("An unmodelled hand cannot be moved: only a foreign plant can run such a scene.")
     if not needs_chain(scene):
         return OneMassMotion(scene, time, members)
     if members is None:

@@ -13,8 +13,8 @@ CLIPPED = "accelerometer.clipped_ticks"
 COUNTERS = {
     DROPPED: "commands that never acted, since a later one overtook them (jitter, or a delay made shorter)",
     LOST: "commands that the line lost, of those that would have acted within the run",
-    SATURATED: "commands whose force the saturation of the actuator cut off; of a scene with one alone",
-    CLIPPED: "ticks at which the accelerometer's range cut its reading off; of a scene with one alone",
+    SATURATED: "commands whose force the saturation of the actuator cut off; only in scenes with one",
+    CLIPPED: "ticks at which the accelerometer's range cut its reading off; only in scenes with one",
 }
 
 

@@ -20,7 +20,7 @@ from haploop.protocol.transport.telemetry import Publisher
 from haploop.protocol.transport.wire import Message
 
 ROLE = "plant"
-_NO_FORCE = "the controller gave a force that is no finite number"
+_NO_FORCE = "the controller gave a force that is not a finite number"
 
 
 class PlantNode:

@@ -18,8 +18,8 @@ class AdaptiveInertia(Element):
 
     kind = "adaptive-inertia"
     asks = ("way", "output_energy")
-    mass: Annotated[float, Quantity("kg", at_least=0, about="most inertia")]
-    damping: Annotated[float, Quantity("N s/m", at_least=0, about="most damping")] = 0.0
+    mass: Annotated[float, Quantity("kg", at_least=0, about="largest inertia")]
+    damping: Annotated[float, Quantity("N s/m", at_least=0, about="largest damping")] = 0.0
 
     def force(self, motion: Motion):
         energy, way = motion.output_energy, motion.way

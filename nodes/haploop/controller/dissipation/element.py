@@ -44,7 +44,7 @@ def raised(error: BaseException | None, kind: type[Element] | None = None) -> st
     if kind and kind.memory is not None and "unpack" in str(error) and not places_of(error):
         return f"TypeError: force must return the force and the memory, as in: return f, memory{place_in(kind)}"
     name = getattr(error, "name", None)
-    hint = f'. An element is told what it names in its class: asks = ("{name}",)' if name in ASKABLE else ""
+    hint = f'. An element gets only what its class asks for: asks = ("{name}",)' if name in ASKABLE else ""
     return f"{type(error).__name__}: {error}{place_in(kind, error)}{hint}"
 
 

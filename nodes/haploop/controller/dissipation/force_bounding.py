@@ -19,7 +19,7 @@ class ForceBounding(Element):
     asks = ("force", "way", "output_before", "device_damping")
     limits = True
     memory = 0.0
-    share: Annotated[float, Quantity("", above=0, at_most=1, about="of the device's damping")] = 1.0
+    share: Annotated[float, Quantity("", above=0, at_most=1, about="share of the device's damping")] = 1.0
 
     def force(self, motion: Motion, memory: Any):
         damping = self.share * motion.device_damping / motion.period_s

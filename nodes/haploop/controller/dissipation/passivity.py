@@ -28,7 +28,7 @@ class PassivityController(Element):
 
     kind = "passivity-controller"
     asks = ("way", "output_energy")
-    damping: Annotated[float, Quantity("N s/m", at_least=0, about="most damping")]
+    damping: Annotated[float, Quantity("N s/m", at_least=0, about="largest damping")]
 
     def force(self, motion: Motion):
         return taken_by_damper(motion.output_energy, self.damping, motion)
@@ -43,7 +43,7 @@ class PassivityControllerReset(Element):
     kind = "passivity-controller-reset"
     asks = ("way", "output_energy")
     memory = 0.0
-    damping: Annotated[float, Quantity("N s/m", at_least=0, about="most damping")]
+    damping: Annotated[float, Quantity("N s/m", at_least=0, about="largest damping")]
 
     def force(self, motion: Motion, memory: Any):
         before_contact = where(motion.contact, memory, motion.output_energy)
@@ -59,7 +59,7 @@ class PassivityControllerReference(Element):
 
     kind = "passivity-controller-reference"
     asks = ("way", "output_energy", "wall_stored")
-    damping: Annotated[float, Quantity("N s/m", at_least=0, about="most damping")]
+    damping: Annotated[float, Quantity("N s/m", at_least=0, about="largest damping")]
 
     def force(self, motion: Motion):
         return taken_by_damper(motion.output_energy - motion.wall_stored, self.damping, motion)

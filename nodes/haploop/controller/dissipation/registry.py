@@ -78,9 +78,9 @@ def checked(element: object, origin: str) -> type[Element]:
         raise PluginError(f'{element.__name__} in {origin} names no kind; write kind = "my-element" in the class.')
     if not _KIND.fullmatch(element.kind) or element.kind in _TAKEN:
         raise PluginError(
-            f"The kind of {element.__name__} in {origin} is {element.kind!r}, but its books are called by it: it must "
-            "be letters, digits, _ and - alone, not end in a dash and a number, as the books of a second element do, "
-            f"and be none of {', '.join(_TAKEN)}."
+            f"The kind of {element.__name__} in {origin} is {element.kind!r}, but its books are named by it: it may "
+            "contain only letters, digits, _ and -, and must neither end in a dash and a number, as the books of a "
+            f"second element do, nor be one of {', '.join(_TAKEN)}."
         )
     if inspect.isabstract(element):
         raise PluginError(f"{element.__name__} in {origin} has no method force(self, motion).")

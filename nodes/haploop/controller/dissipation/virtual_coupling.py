@@ -44,8 +44,8 @@ class VirtualCoupling(Element):
     memory = Tool(0.0, 0.0, 0.0, -1.0)
     stiffness: Annotated[float, Quantity("N/m", at_least=0, about="Kc")]
     damping: Annotated[float, Quantity("N s/m", at_least=0, about="Bc")] = 0.0
-    mass: Annotated[float, Quantity("kg", above=0, about="of the tool")]
-    world_ticks: Annotated[int, Quantity("", at_least=1, at_most=10_000, about="N, ticks in a step of the world")] = 1
+    mass: Annotated[float, Quantity("kg", above=0, about="mass of the tool")]
+    world_ticks: Annotated[int, Quantity("", at_least=1, at_most=10_000, about="N, ticks per step of the world")] = 1
 
     def force(self, motion: Motion, memory: Tool):
         x, ticks, due = motion.x, 1.0 * self.world_ticks, memory.left < 0.5

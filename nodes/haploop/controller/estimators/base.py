@@ -75,7 +75,7 @@ class Estimator(ABC):
         Raises:
             TypeError: it finds none.
         """
-        raise TypeError(f"The estimator {self.name} finds no acceleration.")
+        raise TypeError(f"The estimator {self.name} does not estimate acceleration.")
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ class LowPass(Estimator):
     @classmethod
     def from_scene(cls, scene: Scene, of: str, period_s: float) -> LowPass:
         """Raises TypeError: a low-pass is made over another estimator."""
-        raise TypeError("A low-pass is made over another estimator.")
+        raise TypeError("A low-pass wraps another estimator.")
 
     def start(self, u: Any, sample: Sample) -> Any:
         memory = self.raw.start(u, sample)

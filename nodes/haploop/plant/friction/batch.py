@@ -42,7 +42,9 @@ class BatchFrictionMotion(RubbingHistory, ChainMotion):
             return numbers[0] if len(set(numbers)) == 1 else np.array(numbers)[self._device]
 
         if len({tuple(i for row in (of.force, of.change) for i, _ in row.of_states) for of in of_devices}) > 1:
-            raise ArithmeticError("Devices on whose first bodies other states act cannot be moved together.")
+            raise ArithmeticError(
+                "Devices with different states acting on their first bodies cannot be moved together."
+            )
         return tree_map(of_each, *of_devices)
 
     def _device_of(self, place: int) -> FrictionMotion:

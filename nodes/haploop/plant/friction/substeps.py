@@ -122,8 +122,8 @@ def is_full(pieces: Pieces, first: int, step: int) -> bool:
     if len(pieces) - first > _MOST_PIECES:
         raise ArithmeticError(
             f"Friction switched so often in plant step {step} that it took {_MOST_PIECES} pieces. Raise "
-            "clock.plant_rate where a body swings many times in a plant step; where none does, haploop is wrong: "
-            "report the scene."
+            "clock.plant_rate where a body swings many times in a plant step; where none does, this is a "
+            "bug in haploop: report the scene."
         )
     return False
 

@@ -65,7 +65,7 @@ class Dop853Motion(ChainHistory):
             rates, span, z, "DOP853", t_eval=ends, events=events or None, rtol=_TOLERANCE, atol=self._absolute
         )
         if found.status < 0:
-            raise ArithmeticError(f"DOP853 could not go on: {found.message}")
+            raise ArithmeticError(f"DOP853 could not continue: {found.message}")
         return found
 
 
