@@ -197,7 +197,7 @@ def test_what_is_no_usable_element_is_refused(scene: Scene) -> None:
         def __post_init__(self):
             raise ValueError("not today")
 
-    with pytest.raises(PluginError, match="Nameless in Nameless names no kind"):
+    with pytest.raises(PluginError, match="Nameless in Nameless has no kind"):
         load(FIG6C, elements=[Nameless])
     with pytest.raises(ElementError, match="not today"):
         scene.swap(Picky, at=0.1)

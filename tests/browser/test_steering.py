@@ -90,7 +90,7 @@ def test_what_an_element_becomes_may_be_chosen_before_which_one(stand_in, page):
 @pytest.mark.slow
 def test_notes_on_a_change_are_told_without_the_words_for_a_terminal_and_move_no_chart(stand_in, page):
     before = page.locator("main").bounding_box()
-    note = "wall.stiffness is 1e+08 N/m; is that the unit that was meant? " * 8
+    note = "wall.stiffness is 1e+08 N/m; is that the unit you meant? " * 8
     stand_in.answer = lambda command: (True, f"set wall.stiffness; to go back: set wall.stiffness=1\n{note}")
     page.click("#pause")
     expect(page.locator("#said")).to_have_text(f"set wall.stiffness. {note}".strip())

@@ -220,7 +220,7 @@ def test_a_set_tells_what_check_would_note_of_the_scene_as_it_then_is_and_tells_
     ok, text, data = at_once(subject, "set", {"set": {"wall.stiffness": 1e9}})
     assert ok, text
     assert data["notes"] == text.splitlines()[1:]
-    assert "wall.stiffness is 1e+09 N/m; is that the unit that was meant?" in text
+    assert "wall.stiffness is 1e+09 N/m; is that the unit you meant?" in text
     for value in (1e9, 150.0):
         ok, text, data = at_once(subject, "set", {"set": {"wall.stiffness": value}, "at": 0.5})
         assert (ok, data["notes"]) == (True, []), text

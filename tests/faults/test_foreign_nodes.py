@@ -48,7 +48,7 @@ def test_a_foreign_controller_gives_the_bits_of_our_own_and_is_told_as_foreign(s
         pytest.param("hang", f"has not answered for {BRIEF_S} s and was ended", marks=pytest.mark.slow),
         pytest.param("silent", "no tick was done, though all nodes speak", marks=pytest.mark.slow),
         pytest.param("nan", "the controller gave a force that is not a finite number", marks=pytest.mark.slow),
-        pytest.param("text", "In the loop commands from tick", marks=pytest.mark.slow),
+        pytest.param("text", "In the loop, commands from tick", marks=pytest.mark.slow),
         pytest.param("garbage", "something else (A frame of 10 bytes is not msgpack", marks=pytest.mark.slow),
         pytest.param("mute", "the logger is at tick", marks=pytest.mark.slow),
         ("cut", "column wall has"),

@@ -196,7 +196,7 @@ def line_of(code: str, text: str) -> int:
     [
         ("def push(", "def pushes(", "class Skin", "The class Skin in {}, line {} has no method push"),
         ("    thickness: Any = 1e-3\n", "", "class Skin", "line {1} has the key thickness, but no field of that name"),
-        ('    kind = "pulses"\n', "", "class Pulses", "The class Pulses in {}, line {} names no kind; write kind = "),
+        ('    kind = "pulses"\n', "", "class Pulses", "The class Pulses in {}, line {} has no kind; write kind = "),
         ("def force_at(", "def force(", "class Pulses", "The class Pulses in {}, line {} has no method force_at"),
         ('("alpha", "beta")', '("alpha",)', "class AlphaBeta", "line {1} has the key beta; name it in needs"),
         ("    does: ClassVar", "    done: ClassVar", "class AlphaBeta", "line {1} does not say what its estimate is"),

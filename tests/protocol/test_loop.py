@@ -78,7 +78,7 @@ def test_whatever_the_partner_sends_in_place_of_forces_is_a_named_error(plant: P
         if data:  # an empty frame alone is that of an unknown peer
             plant.partner.send(data)
             with pytest.raises(
-                LoopError, match=r"In the loop commands from tick 5, 1 of them, were expected, but .* came\."
+                LoopError, match=r"In the loop, commands from tick 5, 1 of them, were expected, but .* was received\."
             ):
                 plant.end.exchange(5, [(0.0,)])
     plant.partner.send(pack(1, COMMANDS, 5, [1.5]))
@@ -140,7 +140,9 @@ def test_whatever_comes_in_place_of_samples_is_a_named_error() -> None:
         controller.socket.connect("inproc://pair")
         for data in NO_SAMPLES:
             plant.send(data)
-            with pytest.raises(LoopError, match=r"In the loop samples from tick 5 were expected, but .* came\."):
+            with pytest.raises(
+                LoopError, match=r"In the loop, samples from tick 5 were expected, but .* was received\."
+            ):
                 controller.samples(5)
         plant.send(pack(1, SAMPLES, 5, [[0.25]]))
         assert controller.samples(5) == [[0.25]]

@@ -59,10 +59,10 @@ def test_a_number_that_no_loop_has_is_refused_with_its_bound(overrides, sentence
 def test_a_number_that_hardly_any_loop_has_is_a_scene_and_asked_after():
     assert not notes(load(FIG6C))
     [slow] = notes(load(FIG6C, ["clock.round_trip_delay=5", "duration=20"]))
-    assert slow.startswith("clock.round_trip_delay is 5 s; is that the unit that was meant?")
+    assert slow.startswith("clock.round_trip_delay is 5 s; is that the unit you meant?")
     assert "No force takes effect within the run" in notes(load(FIG6C, ["clock.round_trip_delay=5"]))[1]
     [soft] = notes(load(FIG6C, ["wall.stiffness=0.15"]))
-    assert soft.startswith("wall.stiffness is 0.15 N/m; is that the unit that was meant?")
+    assert soft.startswith("wall.stiffness is 0.15 N/m; is that the unit you meant?")
     assert not notes(load(FIG6C, ["wall.stiffness=0.15 N/mm"]))
 
 

@@ -200,7 +200,7 @@ def test_below_an_overlay_the_notes_of_each_run_stand_with_its_name_and_shared_o
     def below(*given: RunData) -> list[str]:
         return [text.get_text() for text in artists(make_overlay(given, "abcde"[: len(given)]), "note")]
 
-    note = "A note on its scene: wall.stiffness is 15 N/m; is that the unit that was meant?"
+    note = "A note on its scene: wall.stiffness is 15 N/m; is that the unit you meant?"
     assert below(plain, plain) == []
     assert [line.partition(" Haptic")[0] for line in below(plain, soft)] == [f"b: {note}"]
     assert [line.partition(" Haptic")[0] for line in below(soft, plain, soft)] == [f"a, c: {note}"]

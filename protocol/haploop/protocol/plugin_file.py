@@ -62,7 +62,7 @@ def bring_source(source: str, origin: str) -> Brought:
         place = f"The class {kind.__name__} in {origin}{_line_of(source, kind)}"
         if kind.group != ELEMENTS:  # the register of elements itself says what is wrong with one
             if not isinstance(name, str) or not name:
-                raise PluginError(f'{place} names no {kind.named_by}; write {kind.named_by} = "my-own" in the class.')
+                raise PluginError(f'{place} has no {kind.named_by}; write {kind.named_by} = "my-own" in the class.')
             if lacks := sorted(getattr(kind, "__abstractmethods__", ())):
                 raise PluginError(f"{place} has no method {' and no method '.join(lacks)}, which it must define.")
             if why := kind.complaint():

@@ -112,7 +112,7 @@ def note_accelerometer(scene: Scene) -> list[str]:
     if not accelerometer_is_used(scene):
         return [
             "[accelerometer] is not simulated, since no estimate reads it; "
-            'acceleration.source = "accelerometer" would, or velocity.accelerometer with the Kalman filter.'
+            'acceleration.source = "accelerometer" would read it, or velocity.accelerometer with the Kalman filter.'
         ]
     if value_at(scene, "accelerometer.mount") == "motor" and scene.transmission is None:
         return ['accelerometer.mount = "motor" means the only mass, since there is no [transmission].']

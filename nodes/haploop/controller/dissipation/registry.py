@@ -75,7 +75,7 @@ def checked(element: object, origin: str) -> type[Element]:
     if not (inspect.isclass(element) and issubclass(element, Element)):
         raise PluginError(f"{origin} must name a class derived from Element, but gives {element!r}.")
     if not isinstance(getattr(element, "kind", None), str):
-        raise PluginError(f'{element.__name__} in {origin} names no kind; write kind = "my-element" in the class.')
+        raise PluginError(f'{element.__name__} in {origin} has no kind; write kind = "my-element" in the class.')
     if not _KIND.fullmatch(element.kind) or element.kind in _TAKEN:
         raise PluginError(
             f"The kind of {element.__name__} in {origin} is {element.kind!r}, but its books are named by it: it may "

@@ -28,7 +28,7 @@ def address_to_bind(text: str, ports: int, is_guarded: bool) -> tuple[str, int]:
     except ValueError as error:
         raise TransportError(
             "A numeric address such as 127.0.0.1, or one with a port such as 192.0.2.7:5550, was expected for TCP, "
-            f"but {text!r} came."
+            f"but {text!r} was given."
         ) from error
     port = _port(port_text, 65536 - ports, text) if port_text else 0
     if not address.is_loopback and not is_guarded:
@@ -46,7 +46,7 @@ def address_to_reach(text: str) -> str:
     host, port = _split(text.removeprefix("tcp://"))
     if not host or not port or not host.isprintable() or set(host) & set("/@ "):
         raise TransportError(
-            f"The address of a run is the one that haploop run --tcp names, such as 192.0.2.7:5550, but {text!r} came."
+            f"The address of a run is what haploop run --tcp names, such as 192.0.2.7:5550, but {text!r} was given."
         )
     try:
         found = socket.getaddrinfo(host, _port(port, 65535, text), type=socket.SOCK_STREAM)[0][4]
@@ -79,7 +79,7 @@ def _split(text: str) -> tuple[str, str]:
 
 def _port(text: str, most: int, whole: str) -> int:
     if not (text.isascii() and text.isdigit() and 0 < int(text) <= most):
-        raise TransportError(f"A port from 1 to {most} was expected after the address, but {whole!r} came.")
+        raise TransportError(f"A port from 1 to {most} was expected after the address, but {whole!r} was given.")
     return int(text)
 
 

@@ -188,7 +188,7 @@ def check_samples(tick: int, samples: list[list[float]], values: int) -> None:
         if not is_list or not all(type(value) in (int, float) and math.isfinite(value) for value in sample):
             raise LoopError(
                 f"The plant's sample of tick {at} must be a list of {values} finite number{'s' * (values > 1)}, "
-                f"but {shortened(sample)[:80]} came."
+                f"but {shortened(sample)[:80]} was received."
             )
 
 
@@ -212,4 +212,4 @@ def _mismatch(what: str, tick: int, count: int | None, data: bytes) -> str:
         came = f"{name} of tick {fields[0]} with {shortened(fields[1:])[:80]}"
     except WireError as error:
         came = f"something else ({str(error).rstrip('.')})"
-    return f"In the loop {expected} were expected, but {came} came."
+    return f"In the loop, {expected} were expected, but {came} was received."

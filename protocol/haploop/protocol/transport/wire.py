@@ -52,7 +52,9 @@ def decode(data: bytes) -> Frame:
         raise WireError(f"A frame must be an array [version, code, fields...], but is {type(items).__name__}.")
     version, code, *fields = items
     if type(version) is not int or version != VERSION:
-        raise WireError(f"This is protocol version {VERSION}, but a frame of version {_describe(version)} came.")
+        raise WireError(
+            f"This is protocol version {VERSION}, but a frame of version {_describe(version)} was received."
+        )
     name = BY_CODE.get(code) if type(code) is int else None
     if name is None:
         raise WireError(f"No message has the code {_describe(code)}.")

@@ -100,13 +100,12 @@ LOOP = (
     Rule(
         _late,
         "clock.round_trip_delay",
-        "The delay, {delay_s:g} s, is {ticks:.0f} ticks; is that the unit that was meant?",
+        "The delay, {delay_s:g} s, is {ticks:.0f} ticks; is that the unit you meant?",
     ),
     Rule(
         _long,
         "duration",
-        "The run has {ticks:.3g} ticks, {duration_s:.6g} s, and its log holds them all; is that the unit that was "
-        "meant?",
+        "The run has {ticks:.3g} ticks, {duration_s:.6g} s, and its log holds them all; is that the unit you meant?",
     ),
     Rule(
         _no_contact,
@@ -135,7 +134,7 @@ LOOP = (
         _pressed_deep,
         "wall.stiffness",
         "The wall gives way by {depth_mm:.3g} mm to the hand's largest force, {force_N:.3g} N; is {stiffness:g} N/m, "
-        "which is {stiffness_N_mm:g} N/mm, the stiffness that was meant?",
+        "which is {stiffness_N_mm:g} N/mm, the stiffness you meant?",
     ),
     Rule(
         _overwritten,

@@ -27,8 +27,7 @@ def note_unmeant(scene: Scene) -> list[Note]:
     """Returns a sentence for every rule that a resolved scene breaks, and for numbers that hardly any loop has."""
     unusual = [
         Note(
-            f"{key} is {value:g} {unit}; is that the unit that was meant? "
-            f"Haptic loops have {least:g} to {most:g} {unit}.",
+            f"{key} is {value:g} {unit}; is that the unit you meant? Haptic loops have {least:g} to {most:g} {unit}.",
             key,
         )
         for key, least, most, unit in _USUAL

@@ -163,21 +163,21 @@ REACH = (
         _held_by_friction,
         "friction.kinetic",
         "Dry friction of {friction_N:.3g} N holds the device, which the hand pushes by {push_N:.3g} N at most: it "
-        "hardly moves. Is that the unit that was meant?",
+        "hardly moves. Is that the unit you meant?",
         keeps_off=True,
     ),
     Rule(
         _feeble_beside_friction,
         "hand.force",
         "The hand's largest force, {force_N:.3g} N, is very small beside the device's dry friction of "
-        "{friction_N:.3g} N: it does not press a device that has come to rest. Is that the unit that was meant?",
+        "{friction_N:.3g} N: it does not press a device that has come to rest. Is that the unit you meant?",
         keeps_off=True,
     ),
     Rule(
         _beyond_the_end,
         "wall.position",
         "The wall is at {position_m:g} m; a run ends as diverged beyond {most_m:g} m (diverged_beyond), before the "
-        "device gets there. Is that the unit that was meant?",
+        "device gets there. Is that the unit you meant?",
         keeps_off=True,
     ),
     Rule(
