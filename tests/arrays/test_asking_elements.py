@@ -201,7 +201,7 @@ def test_what_an_element_does_not_ask_for_it_is_not_told_and_the_error_says_how_
         def force(self, motion: Motion) -> Any:
             return -motion.way * motion.wall_force
 
-    with pytest.raises(RunFailed, match=r'names in its class: asks = \("wall_force",\)'):
+    with pytest.raises(RunFailed, match=r'its class asks for: asks = \("wall_force",\)'):
         alone(with_element(pressed(), "curious"), KINDS | {"curious": Curious})
 
 

@@ -102,7 +102,7 @@ def test_whoever_comes_with_keys_to_a_run_without_is_told_so(keys, monkeypatch):
 def test_the_keys_of_another_run_are_told_from_a_key_that_is_not_known(keys, tmp_path, impatient):
     make_keys(tmp_path / "other")
     with listening(keys) as address:
-        assert "clock.key is not that of its keys" in why(address, tmp_path / "other")
+        assert "clock.key does not belong to its keys" in why(address, tmp_path / "other")
 
 
 @pytest.mark.slow
