@@ -41,7 +41,7 @@ def test_text_with_a_unit_is_the_same_float_as_the_si_number_to_the_last_bit(tex
     ("given", "sentence"),
     [
         ("2 ms", "ms is a time, but N/m is a stiffness."),
-        ("3 N/m °", "N/m ° counts angle and cannot stand for N/m."),
+        ("3 N/m °", "N/m ° contains an angle and cannot be used for N/m."),
         ("5 Ns/mm", '"Ns/mm" is not a unit; leave a space between multiplied units.'),
         ("5", 'Text must carry a unit, such as "5 N/m"'),
         ("five N/m", 'It must be a number and its unit, such as "1 N/m" or "0.2 N/m / 4096".'),
@@ -85,7 +85,7 @@ def test_a_word_that_is_no_unit_is_told_with_the_nearest_unit_of_its_dimension_a
 def test_an_angular_rate_is_not_taken_for_a_frequency(text):
     """pint alone takes 10 rad/s for 10 Hz and 60 rpm for 6.28 Hz."""
     [mistake] = mistakes(velocity={"cutoff": text})
-    assert "counts angle and cannot stand for Hz" in mistake
+    assert "contains an angle and cannot be used for Hz" in mistake
 
 
 def test_a_rate_is_a_whole_number():

@@ -221,7 +221,7 @@ def test_a_change_of_a_wall_that_is_not_there_and_an_element_of_ones_own_are_tol
 REPAIRS = {
     "duration = 0.0003": "the least legal value is 0.001 s",
     "duration = 1,5": "Write decimals with a point, not a comma: 1.5.",
-    "duration = 2 ms": 'A number with its unit is text, in quotes: "2 ms".',
+    "duration = 2 ms": 'A number with its unit must be text in quotes: "2 ms".',
     'duration = "0,3 s"': 'Write decimals with a point, not a comma: "0.3 s".',
     "duration = 1.0\n[dissipation]\nkind='damping'": "It must be a list of tables: [[dissipation]], two",
     "": "haploop advise my.toml takes it as it is",

@@ -182,7 +182,7 @@ def _another_dimension(unit: str, dimension: object, target: str, wanted: object
 
 def _angle(unit: str, target: str) -> str:
     # To pint an angle is a bare number, so that 1 rad/s would pass for 1 Hz.
-    return f"{unit} counts angle and cannot stand for {target or 'a bare number'}."
+    return f"{unit} contains an angle and cannot be used for {target or 'a bare number'}."
 
 
 def _convert_any(amount: Decimal, unit: str, target: str) -> Decimal:

@@ -78,7 +78,7 @@ def _hint(problem: str, text: str) -> str:
     if re.fullmatch(r"[+-]?\d+,\d+", value):
         return f" Write decimals with a point, not a comma: {value.replace(',', '.')}."
     if re.fullmatch(r"[+-]?\d[\d.,]*\s*[^\W\d][\w */^.]*", value):
-        return f' A number with its unit is text, in quotes: "{value.replace(",", ".")}".'
+        return f' A number with its unit must be text in quotes: "{value.replace(",", ".")}".'
     return ""
 
 
