@@ -61,4 +61,4 @@ class Clock:
         self.say(WAITING, tick, on)
         self.listen()
         if time.monotonic() - self._heard > self._silence_s:
-            raise SystemExit(f"Nothing was heard of the clock for {self._silence_s:g} s; is the run still there?")
+            raise SystemExit(f"Nothing was heard from the clock for {self._silence_s:g} s; is the run still there?")

@@ -16,7 +16,7 @@ class Law {
     const isSpring = wall && (wall.kind ?? "spring") === "spring";
     if (!isSpring || element?.kind !== "damping" || others.length || velocity || acceleration)
       throw new Error(
-        "This controller is a spring wall with one damping and plain differences, but the scene asks for another.",
+        "This controller is a spring wall with one damping and plain differences, but the scene needs something else.",
       );
     this.wall = { position: wall.position, stiffness: wall.stiffness, into_wall: wall.occupies === "below" ? -1 : 1 };
     this.element = {

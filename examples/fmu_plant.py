@@ -29,10 +29,10 @@ def main():
     parser.add_argument("--velocity", metavar="NAME", help="output, m/s")
     parser.add_argument("--interface", choices=("cs", "me"), help="co-simulation or model exchange [cs]")
     parser.add_argument("--set", action="append", default=[], type=assignment, metavar="NAME=VALUE[,VALUE ...]")
-    parser.add_argument("--state-space", action="store_true", help="the Reference FMUs' StateSpace, made the scene's")
+    parser.add_argument("--state-space", action="store_true", help="the Reference FMUs' StateSpace, set to the scene")
     options, rest = parser.parse_known_args()
     if len(rest) != 1:  # for take_seat
-        parser.error(f"One word more was expected, that of haploop run --node or the file of --external, not {rest}.")
+        parser.error(f"One more word was expected, from haploop run --node or the file of --external, not {rest}.")
     seat = take_seat(f"FMU {Path(options.fmu).name}", "3.0")
     with TemporaryDirectory() as folder:
         seat.run(*device(seat.scene, seat.step_s, options, folder))
@@ -114,7 +114,7 @@ class Unit:
         variable = self._variables[base]
         size, index = math.prod(variable.shape or (1,)), int(number or 1) - 1
         if not 0 <= index < size:
-            raise SystemExit(f"{name} was asked, but {base} has {size} elements, counted from 1.")
+            raise SystemExit(f"{name} was requested, but {base} has {size} elements, counted from 1.")
         return variable.valueReference, index, size
 
     def _get(self, name):

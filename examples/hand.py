@@ -22,7 +22,7 @@ def hand_force(scene):
     if kind == "trace":
         times, forces = table["time"], table["force"]
         return lambda t: _between(t, times, forces)
-    raise ValueError(f"A hand's force of kind {kind!r} is not known here.")
+    raise ValueError(f"A hand force of kind {kind!r} is not supported here.")
 
 
 def _minimum_jerk(s):

@@ -55,7 +55,7 @@ class Loop:
             case [int() as version, int() as code, int() as of, [int() | float() as force]]:
                 if (version, code, of) == (VERSION, COMMANDS, tick):
                     return float(force)
-        raise SeatError(f"A command of tick {tick} was expected of the controller, but {str(frame)[:80]} came.")
+        raise SeatError(f"A command of tick {tick} was expected from the controller, but {str(frame)[:80]} came.")
 
     def _hear(self):
         while not self._socket.poll(SAY_MS):

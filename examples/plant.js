@@ -30,7 +30,7 @@ class Motion {
   constructor({ device, hand }, h) {
     const { mass = 0, damping = 0, stiffness = 0, rest = 0, force } = hand ?? {};
     if (force && !["constant", "ramp"].includes(force.kind))
-      throw new Error(`This plant knows no hand's force of kind ${force.kind}.`);
+      throw new Error(`This plant does not support a hand force of kind ${force.kind}.`);
     this.h = h;
     [this.x, this.v] = [device.position, device.velocity];
     const push = (t) => (force ? force.value * (force.kind === "ramp" ? Math.min(t / force.rise_time, 1) : 1) : 0);
@@ -69,7 +69,7 @@ take_seat("plant", async (seat) => {
     n = time.plant_rate / time.control_rate;
   const strange = Object.keys(scene).find((key) => !KNOWN.includes(key) && scene[key] != null);
   if (strange || scene.acceleration?.source)
-    throw new Error(`This plant knows nothing of ${strange ?? "an accelerometer"}.`);
+    throw new Error(`This plant does not support ${strange ?? "an accelerometer"}.`);
   const motion = new Motion(scene, 1 / time.plant_rate);
   let rows = [],
     force = 0,

@@ -157,7 +157,7 @@ function take_seat(role, work) {
   const begin = async (text, directory) => {
     const start = JSON.parse(text);
     if (start.transport.keys)
-      (console.error("This program knows nothing of keys; run it without --keys."), process.exit(1));
+      (console.error("This program does not support keys; run it without --keys."), process.exit(1));
     const seat = new Seat(role, start, directory);
     try {
       await Promise.race([work(seat), seat.failed]);

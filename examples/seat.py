@@ -36,7 +36,7 @@ def take_seat(name, version):
     file external-plant.json that a run with --external plant has written.
     """
     if len(sys.argv) < 2:
-        raise SystemExit(f'This is started by: haploop run SCENE --node plant="python {sys.argv[0]} ..."')
+        raise SystemExit(f'Start this program by: haploop run SCENE --node plant="python {sys.argv[0]} ..."')
     last = sys.argv.pop()
     is_external = last.endswith(".json")
     start = json.loads(Path(last).read_text(encoding="utf-8") if is_external else sys.stdin.readline())

@@ -154,7 +154,7 @@ static void make_change(void) {
   if (set.type != MSGPACK_OBJECT_MAP || known < set.via.map.size) {
     msgpack_packer sentence = {&refusals[0], msgpack_sbuffer_write}, change = {&refusals[1], msgpack_sbuffer_write};
     char why[120];
-    int length = snprintf(why, sizeof why, "The change at tick %lld was refused: this controller is a wall alone.",
+    int length = snprintf(why, sizeof why, "The change at tick %lld was refused: this controller is only a wall.",
                           (long long)tick);
     msgpack_pack_str_with_body(&sentence, why, length);
     msgpack_pack_map(&change, event.via.map.size + 1);
@@ -177,7 +177,7 @@ static void begin_law(msgpack_object scene, msgpack_object timebase) {
   if (wall.type != MSGPACK_OBJECT_MAP || (elements.type == MSGPACK_OBJECT_ARRAY && elements.via.array.size) ||
       at(scene, "velocity").type == MSGPACK_OBJECT_MAP || at(scene, "acceleration").type == MSGPACK_OBJECT_MAP ||
       (at(wall, "kind").type == MSGPACK_OBJECT_STR && strcmp(text(at(wall, "kind")), "spring")))
-    fail("This controller is a spring wall alone with plain differences, but the scene asks for another.");
+    fail("This controller is only a spring wall with plain differences, but the scene needs something else.");
   law.position = number(at(wall, "position")), law.stiffness = number(at(wall, "stiffness"));
   law.into_wall = strcmp(text(at(wall, "occupies")), "below") ? 1 : -1;
   law.period = 1 / number(at(timebase, "control_rate"));
@@ -207,7 +207,7 @@ int main(int argc, char** argv) {
   from_json(line, "address", address, sizeof address), from_json(line, "secret", secret, sizeof secret);
   from_json(line, "host", host, sizeof host);
   if (strstr(line, "\"keys\": {"))
-    return fprintf(stderr, "This program knows nothing of keys; run it without --keys.\n"), 1;
+    return fprintf(stderr, "This program does not support keys; run it without --keys.\n"), 1;
   if (*host) snprintf(own, sizeof own, "tcp://%s:*", host);
   else snprintf(own, sizeof own, "%.*s/controller.sock", (int)(strrchr(address, '/') - address), address);
 
@@ -247,7 +247,7 @@ int main(int argc, char** argv) {
       msgpack_object* field = from_plant.field;
       if (pending != SAMPLES || from_plant.fields < 2 || number(field[0]) != (double)tick ||
           field[1].type != MSGPACK_OBJECT_ARRAY)
-        fail("The plant sent something else than the samples of the next tick.");
+        fail("The plant sent something other than the samples of the next tick.");
       msgpack_object_array samples = field[1].via.array;
       if (until >= tick + samples.size) {  // so that the changes of these ticks are known
         int64_t from = tick;

@@ -124,7 +124,7 @@ def test_replay_says_whether_every_bit_agreed(done, tmp_path):
     )
     bad = haploop("replay", str(other))
     assert bad.exit_code == 1
-    assert "scene.toml is not the scene that the log holds" in bad.stdout
+    assert "scene.toml differs from the scene in the log" in bad.stdout
 
 
 @pytest.mark.parametrize(

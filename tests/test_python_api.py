@@ -133,7 +133,7 @@ def test_mistakes_are_the_sentences_of_the_command_line_all_at_once(scene: Scene
         scene.set({"device.mass": 1.0}, at=0.1)
     with pytest.raises(KeyError, match=r"no walls in this scene \(did you mean wall\?\); it holds title"):
         scene["walls"]
-    with pytest.raises(ValueError, match="A pace of 1 needs the clock of a run as processes"):
+    with pytest.raises(ValueError, match="A pace of 1 needs the clock of a run in processes"):
         run(scene, pace=1)
 
 
@@ -225,7 +225,7 @@ def test_numbers_of_the_summary_come_with_their_units(scene: Scene) -> None:
     for name, key in (("force_max", "extremes.force_max_N"), ("Oscillation_m", "window.oscillation_m")):
         with pytest.raises(KeyError, match=f"did you mean {key}"):
             result.quantity(name)
-    with pytest.raises(TypeError, match=r"out must be a directory, .* a scene is changed by load\(scene\).set"):
+    with pytest.raises(TypeError, match=r"out must be a directory, .* to change a scene, use load\(scene\).set"):
         run(scene, {"wall.stiffness": 300.0})  # pyright: ignore[reportArgumentType]
     assert repr(result).startswith(f"<{result.verdict}: ")
 

@@ -203,7 +203,7 @@ def test_a_fault_that_names_no_field_is_pinned_to_none_and_an_element_taken_back
 
 @pytest.mark.slow
 def test_what_the_run_refuses_without_naming_a_field_is_told_in_the_form(stand_in, page):
-    stand_in.answer = lambda command: (False, "The run ends at tick 3000, 3 s; nothing can change from there on.")
+    stand_in.answer = lambda command: (False, "The run ends at tick 3000, 3 s; nothing can change from then on.")
     page.click("#swap-do")
     expect(page.locator("#swap-problem")).to_contain_text("The run ends at tick 3000")
 

@@ -103,7 +103,7 @@ def test_what_changed_before_costs_a_further_change_nothing_and_what_waits_is_li
     assert len(subject._scene.event) == 1
     for _ in range(19):
         subject.change({"set": {"wall.stiffness": 100.0}})
-    with pytest.raises(ClockError, match="20 changes wait"):
+    with pytest.raises(ClockError, match="20 changes are already waiting"):
         subject.change({"set": {"wall.stiffness": 100.0}})
     subject.settle(40)
     subject.until = 41

@@ -87,7 +87,7 @@ def test_a_process_that_does_not_say_what_it_is_may_take_part(role: str, program
 def test_a_wrong_secret_is_called_so_and_kept_by_the_role_it_came_with(served: Served) -> None:
     code, reason = served.answer(pack(1, JOIN, "plant", "0" * 32, 1, {"loop": "x", "telemetry": "y"}, True, {}))
     assert code == REFUSED
-    assert reason == "JOIN as plant, a role of the run's own process, came with a wrong secret; join as an observer."
+    assert reason == "JOIN as plant, a role of the run's own processes, came with a wrong secret; join as an observer."
     assert served.server.roster.refused == {"plant": reason}
 
 
@@ -142,7 +142,7 @@ def test_an_observer_that_holds_the_run_and_is_silent_or_never_ready_is_taken_of
     assert [node.role for node, _ in late_observers(roster, 16.0, 5.0)] == ["mute"]
     late = late_observers(roster, 30.0, 5.0)
     assert [(node.role, why.partition(";")[0]) for node, why in late] == [
-        ("mute", "Nothing was heard of you for 5 s"),
+        ("mute", "Nothing was heard from you for 5 s"),
         ("slow", "You were not ready within 20 s"),
     ]
     roster.discount_silence(20.0)
@@ -161,7 +161,7 @@ def test_of_a_run_that_has_ended_an_observer_is_kept_what_it_takes_but_not_what_
     node.heard = 27.5
     node.reached(60)
     assert [why for _, why in late_observers(roster, 27.5, 5.0, ended_at=20.0)] == [
-        "You took nothing for 5 s after the end; what is left is kept for you no longer."
+        "You took nothing for 5 s after the end; the rest is no longer kept for you."
     ]
     assert late_observers(roster, 27.5, 5.0) == []
 

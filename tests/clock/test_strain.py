@@ -15,9 +15,9 @@ def quiet(monkeypatch) -> None:
     ("state", "used_s", "words"),
     [
         ("T", 0.0, "It is stopped"),
-        ("D", 0.0, "waits for a disk"),
-        ("R", 0.02, "got next to no processor time"),
-        ("R", 2.4, "at work all the while"),
+        ("D", 0.0, "waiting for a disk"),
+        ("R", 0.02, "got almost no processor time"),
+        ("R", 2.4, "working the whole time"),
         ("R", 0.8, ""),
         ("S", 0.0, ""),
         ("", 0.0, ""),

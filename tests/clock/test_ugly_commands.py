@@ -48,12 +48,12 @@ def deep(levels: int) -> dict[str, Any]:
         ("set", {"set": {f"wall.k{i}": 1.0 for i in range(10_000)}}, "at most 64 keys and values"),
         ("set", {"set": [0.0] * 1000}, "at most 64 keys and values"),
         ("set", {"set": deep(300)}, "3 tables deep"),
-        ("set", {"set": {}}, "Nothing was set: a set names a key at least"),
+        ("set", {"set": {}}, "Nothing was set: a set names at least one key"),
         ("pace", {"pace": "x"}, "A pace is a number from 1e-06 to 1e+06, or free, but 'x' was asked for."),
         ("swap", {"swap": {"kind": [[[[]]]]}}, "3 tables deep"),
-        ("set", {"set": {"w" * 201: 1.0}}, "at most 200 letters, but one has 201"),
-        ("set", {"set": {"wall.stiffness": "1 " + "m " * 200}}, "at most 200 letters"),
-        ("set", {"set": {"wall.stiffness": b"\xff" * 300}}, "at most 200 letters"),
+        ("set", {"set": {"w" * 201: 1.0}}, "at most 200 characters, but one has 201"),
+        ("set", {"set": {"wall.stiffness": "1 " + "m " * 200}}, "at most 200 characters"),
+        ("set", {"set": {"wall.stiffness": b"\xff" * 300}}, "at most 200 characters"),
         ("set", {"set": {"wall.stiffness": "3 furlong"}}, "unit that a running loop does not know; it knows Hz, J"),
         ("set", {"set": {"wall.stiffness": "3 ms"}}, "ms is a time, but N/m is a stiffness"),
         ("set", {"set": {"wall.stiffness": "3 kg"}}, 'wall.stiffness is "3 kg". kg is a mass, but N/m is a stiffness'),
@@ -63,8 +63,8 @@ def deep(levels: int) -> dict[str, Any]:
         ("swap", {"swap": None}, "exactly one of swap, set"),
         ("swap", {"swap": {"kind": ["damping"]}}, "damping"),
         ("stop", {"self": 1}, "The arguments of stop cannot be used: it takes none."),
-        ("set", {"set": {1: 2}}, "The keys of what a command carries are texts, but 1 was given as one."),
-        ("swap", {"swap": {"kind": "damping", None: 2}}, "are texts, but None was given"),
+        ("set", {"set": {1: 2}}, "The keys in a command must be texts, but 1 was given as one."),
+        ("swap", {"swap": {"kind": "damping", None: 2}}, "must be texts, but None was given"),
         ("swap", {"surprise": 1}, "it takes swap, element, at, reload, and swap must be given."),
         ("pace", {"pace": 1e305}, "from 1e-06 to 1e+06, or free, but 1e+305"),
         ("pace", {"pace": float("inf")}, "or free, but inf"),
@@ -178,7 +178,7 @@ def test_undo_takes_changes_back_one_by_one_the_last_first() -> None:
     assert told == subject.events[:2], "what no node knew of is gone"
     assert [sorted(event.keys() & {"set", "swap"}) for _, event in subject.events[2:]] == [["swap"], ["set"]]
     ok, text, _ = at_once(steer, "undo", {})
-    assert (ok, text) == (False, "There is nothing to undo: no swap and no set that a command asked for is left.")
+    assert (ok, text) == (False, "There is nothing to undo: no swap or set requested by a command is left.")
 
 
 class Switched(Element):

@@ -230,8 +230,8 @@ def test_what_strangers_send_changes_no_bit_of_a_run_with_a_program_of_another_l
     ("role", "name", "scene", "says"),
     [
         ("controller", "controller.js", "fig6c.toml", "a spring wall with one damping"),
-        ("controller", "wall.c", "fig6b.toml", "a spring wall alone"),
-        ("plant", "plant.js", "all_effects.toml", "knows nothing of"),
+        ("controller", "wall.c", "fig6b.toml", "only a spring wall"),
+        ("plant", "plant.js", "all_effects.toml", "does not support"),
     ],
 )
 def test_a_scene_that_asks_for_more_than_a_program_can_ends_the_run_with_its_sentence(

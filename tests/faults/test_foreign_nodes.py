@@ -46,7 +46,7 @@ def test_a_foreign_controller_gives_the_bits_of_our_own_and_is_told_as_foreign(s
         pytest.param("die", "was killed by SIGKILL; the last tick all nodes had done is", marks=pytest.mark.slow),
         pytest.param("exit", "ended with exit status 3; the last tick all nodes", marks=pytest.mark.slow),
         pytest.param("hang", f"has not answered for {BRIEF_S} s and was ended", marks=pytest.mark.slow),
-        pytest.param("silent", "no tick was done, though all nodes speak", marks=pytest.mark.slow),
+        pytest.param("silent", "no tick was done, though all nodes respond", marks=pytest.mark.slow),
         pytest.param("nan", "the controller gave a force that is not a finite number", marks=pytest.mark.slow),
         pytest.param("text", "In the loop, commands from tick", marks=pytest.mark.slow),
         pytest.param("garbage", "something else (A frame of 10 bytes is not msgpack", marks=pytest.mark.slow),
@@ -104,7 +104,7 @@ def test_a_program_that_ignores_every_end_and_its_children_end_with_the_run(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--node", "controller=no-such-program-9"], "'no-such-program-9', is not there or cannot be executed"),
+        (["--node", "controller=no-such-program-9"], "'no-such-program-9', does not exist or cannot be executed"),
         (["--node", "controller=sh 'x"], "cannot be split into words: No closing quotation"),
         (["--node", "controller="], "is empty"),
         (["--node", "controller"], "--node expects ROLE=COMMAND"),

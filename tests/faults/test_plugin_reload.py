@@ -89,7 +89,7 @@ def test_undo_brings_back_the_code_before_a_reload_and_one_taken_back_is_told_at
     plugin.write_text(source().replace("-self", "-2 * self"))
     text, doubled = run_directory.ask(run.live, "swap", **SWAP, reload=True)
     assert "to go back: undo" in text
-    assert "If it raises or gives no finite number within its first second, what was there before comes back" in text
+    assert "If it raises or gives no finite number within its first second, what was there before is restored" in text
     undone = run.ask("undo")["tick"]
     plugin.write_text(source(at_force="1 / (self.tick < 50)"))
     tick = run.ask("swap", **SWAP, reload=True)["tick"]
@@ -109,7 +109,7 @@ def test_undo_brings_back_the_code_before_a_reload_and_one_taken_back_is_told_at
 def test_a_reload_that_never_ends_is_answered_and_the_run_ends_as_it_would_have(running, scene, tmp_path):
     plugin, run = braked(running, scene, tmp_path)
     plugin.write_text(source(at_force="time.sleep(1000)"))
-    with pytest.raises(run_directory.CommandRefused, match="10 s were not enough as the element brake was made"):
+    with pytest.raises(run_directory.CommandRefused, match="it took longer than 10 s while the element brake was"):
         run.ask("swap", **SWAP, reload=True)
     run.ask("stop")
     assert run.summary()["ended"] == "stopped"
@@ -164,7 +164,7 @@ def test_a_change_that_hangs_in_the_controller_alone_is_refused_at_its_tick_and_
         told = run_directory.ask(run.live, "swap", **SWAP, reload=True)[0]
     except run_directory.CommandRefused as refusal:
         told = str(refusal)
-    assert re.search(r"when time gets there|The change at tick \d+, .*DeadlineOver", told)
+    assert re.search(r"when time reaches it|The change at tick \d+, .*DeadlineOver", told)
     run.reaches(run.ask("status")["granted"] + 500)
     run.ask("stop")
     assert run.summary()["ended"] == "stopped"

@@ -28,15 +28,15 @@ BREAKS = {
     "raise KeyboardInterrupt": "KeyboardInterrupt",
     "raise BaseException('odd')": "BaseException: odd",
     "os.closerange(3, 50)": "ended the process it was tried in",
-    "for fd in range(3, 20): exec('try: os.write(fd, b\"nonsense\\\\n\")\\nexcept OSError: pass')": "answered for",
-    "for fd in range(3, 20): exec('try: os.write(fd, b\"[3]\\\\n\")\\nexcept OSError: pass')": "answered for",
+    "for fd in range(3, 20): exec('try: os.write(fd, b\"nonsense\\\\n\")\\nexcept OSError: pass')": "answered in place",
+    "for fd in range(3, 20): exec('try: os.write(fd, b\"[3]\\\\n\")\\nexcept OSError: pass')": "answered in place",
     "hoard = bytearray(1 << 36)": "MemoryError",
     "sys.stdin.read() or input()": "EOFError",
 }
 HANGS = {
-    NEVER: "1 s were not enough as",
-    "time.sleep(1000)": "1 s were not enough as",
-    "subprocess.run(['sleep', '1000'])": "1 s were not enough as",
+    NEVER: "it took longer than 1 s while",
+    "time.sleep(1000)": "it took longer than 1 s while",
+    "subprocess.run(['sleep', '1000'])": "it took longer than 1 s while",
 }
 BRAKE = ElementTable(name="brake", parameters={"damping": 0.05})
 
@@ -69,7 +69,9 @@ def test_an_element_that_gives_text_is_told_what_it_gave():
 @pytest.mark.parametrize("forged", ["{}", '{"kinds": 3}', '{"kinds": {"brake": []}}', "[" * 60_000])
 def test_an_answer_that_the_file_itself_has_given_is_told_as_such(forged):
     write = f"os.write(fd, {forged.encode()!r} + bytes([10]))"
-    with pytest.raises(PluginError, match=r"brake\.py answered for the process it was tried in as it loaded"):
+    with pytest.raises(
+        PluginError, match=r"answered in place of the process it was tried in while it was being loaded"
+    ):
         tried(
             source(f"""
 for fd in range(3, 20):

@@ -82,7 +82,7 @@ def test_all_that_is_printed_stands_in_a_file_of_the_run_marked_with_node_and_ti
     assert kept == [f"controller, tick {tick}: tick {tick}" for tick in range(300)]
     told = run.stderr.splitlines()
     assert told[:10] == kept[:10]
-    assert f"all of it stands in {run.out / 'prints.txt'}" in run.stderr
+    assert f"all of it is in {run.out / 'prints.txt'}" in run.stderr
 
 
 @pytest.mark.slow
@@ -152,7 +152,7 @@ def test_a_terminal_gets_few_lines_a_second_without_control_characters(tmp_path,
     assert 100 <= len(told) <= 125
     assert max(map(len, told)) < 210
     assert all(line.isprintable() for line in told)
-    assert sum("all of it stands in" in line for line in told) == 1
+    assert sum("all of it is in" in line for line in told) == 1
 
 
 @pytest.mark.parametrize("has_pidfd", [True, False])

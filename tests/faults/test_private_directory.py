@@ -137,7 +137,7 @@ def test_a_base_directory_that_is_a_link_is_refused_with_a_sentence(tmp_path, li
 def test_a_base_directory_that_cannot_be_used_is_a_sentence_and_no_run_is_started(
     of, live_runs_here, tmp_path, monkeypatch
 ):
-    base, words = live_runs_here / "haploop", "with mode 0755; mend it with chmod 700"
+    base, words = live_runs_here / "haploop", "with mode 0755; repair it with chmod 700"
     if of == "mode":
         base.mkdir()
         base.chmod(0o755)

@@ -83,14 +83,14 @@ def test_only_the_half_that_is_ours_is_held_against_what_it_did(tmp_path, key, v
     ("key", "value", "foreign", "says"),
     [
         ("wall.stiffness", 101.0, "controller", "Haploop's own controller would have answered the same samples with f"),
-        ("device.mass", 0.011, "plant", "Haploop's own plant would have been up to "),
+        ("device.mass", 0.011, "plant", "Haploop's own plant would have deviated by up to "),
         ("device.mass", 0.011, "controller", "Either the log was changed, or the controller sent other forces than"),
     ],
 )
 def test_the_half_of_somebody_elses_is_held_against_what_our_own_would_have_done(tmp_path, key, value, foreign, says):
     ran = scene(**TAP)
     same = replay(left(tmp_path / "same", ran, foreign)).other
-    assert same == f"Haploop's own {foreign} would have done the same there, to the bit."
+    assert same == f"Haploop's own {foreign} would have done the same in its place, bit for bit."
     assert replay(left(tmp_path / "other", ran, foreign, told=with_value(ran, key, value))).other.startswith(says)
 
 
@@ -107,7 +107,7 @@ def test_a_change_that_a_controller_refused_is_not_asked_of_our_own_either(tmp_p
     made, kinds, events = repeatable(out, recorded)
     change = {"set": {"wall.stiffness": 150.0}}
     refused = (130, {"refused": "No.", "change": {"tick": 120, **change}})
-    same = "Haploop's own controller would have done the same there, to the bit."
+    same = "Haploop's own controller would have done the same in its place, bit for bit."
     assert beside_own("controller", made, kinds, [(120, change), refused, *events], recorded) == same
     assert beside_own("controller", made, kinds, [(120, change), *events], recorded).endswith("first at 0.12 s.")
 
@@ -126,7 +126,7 @@ READ = {"acceleration": {"source": "accelerometer"}}
 def test_readings_of_an_accelerometer_are_fed_back_where_they_are_in_the_log(tmp_path: Path):
     assert replay(left(tmp_path / "run", scene(**TAP, **READ), "plant")).differences == []
     filtered = scene(**TAP, acceleration={"source": "accelerometer", "cutoff": 50})
-    with pytest.raises(ReplayError, match="what it was sent of the accelerometer is not in the log"):
+    with pytest.raises(ReplayError, match="the accelerometer samples sent to it are not in the log"):
         replay(left(tmp_path / "other", filtered, "plant"))
 
 
@@ -145,7 +145,7 @@ def test_a_run_of_which_nothing_was_ours_cannot_be_repeated_and_names_both(tmp_p
 
 @pytest.mark.parametrize("programs", ["nonsense", "[]", '{"plant": {}}', '{"plant": {"own": 0}}'])
 def test_a_log_that_holds_something_else_for_its_programs_is_refused(tmp_path: Path, programs: str):
-    with pytest.raises(LogError, match=r"programs\.json is none of a run"):
+    with pytest.raises(LogError, match=r"programs\.json in the log is not that of a run"):
         replay(left(tmp_path / "run", scene(**TAP), programs=programs))
 
 
@@ -154,7 +154,8 @@ def test_the_command_says_which_half_was_repeated_and_whose_the_other_was(tmp_pa
     assert answer.exit_code == 0
     assert answer.stdout == (
         "Every bit of 200 ticks agreed. The controller was repeated from its samples; "
-        "the plant was Bench 2.1 (./bench --fast). Haploop's own plant would have done the same there, to the bit.\n"
+        "the plant was Bench 2.1 (./bench --fast). "
+        "Haploop's own plant would have done the same in its place, bit for bit.\n"
     )
     wrong = left(tmp_path / "wrong", scene(**TAP), "plant", told=with_value(scene(**TAP), "wall.stiffness", 101.0))
     answer = CliRunner().invoke(app, ["replay", str(wrong), "--json"])

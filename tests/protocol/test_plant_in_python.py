@@ -206,7 +206,7 @@ def test_a_plant_in_python_takes_a_seat_that_waits_for_it(tmp_path: Path, tcp: s
 @pytest.mark.parametrize(
     ("options", "why"),
     [
-        (lambda: BY_PLANT, "own plant keeps none"),
+        (lambda: BY_PLANT, "own plant does not keep time"),
         (lambda: BY_PLANT | plant() | {"pace": 1.0}, "leave out one of them"),
     ],
 )
@@ -220,7 +220,7 @@ def test_time_is_left_to_the_plant_only_where_one_can_keep_it(
 
 @pytest.mark.parametrize(
     ("event", "why"),
-    [("pause=true", "pauses; a device does not"), ('set={"clock.round_trip_delay"=0.001}', DELAY_STAYS)],
+    [("pause=true", "pauses; a device does not pause"), ('set={"clock.round_trip_delay"=0.001}', DELAY_STAYS)],
 )
 def test_a_scene_that_changes_a_devices_time_is_not_run(tmp_path: Path, event: str, why: str) -> None:
     with pytest.raises(OutputError, match=why):

@@ -76,7 +76,7 @@ class SimTrial:
     def load(self) -> Generator[None, None, dict[str, type[Element]]]:
         yield from self._after(10.0 if self._source == HANGS else self._world.dice.expovariate(30.0))
         if self._source in (HANGS, _DIES):
-            raise PluginError(f"The plugin {self._origin} was given up, or ended the process it was tried in.")
+            raise PluginError(f"The plugin {self._origin} was stopped, or ended the process it was tried in.")
         return load_source(self._source, self._origin)
 
     def make(self, elements: Iterable[ElementTable]) -> Generator[None, None, None]:

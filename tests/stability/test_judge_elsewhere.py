@@ -33,7 +33,7 @@ class Late(Element):
     ("at_350", "word", "says"),
     [
         ("pass", "steady", ""),
-        ("time.sleep(1000)", "undecided", "its plugins did not come back within 0.8 s"),
+        ("time.sleep(1000)", "undecided", "its plugins did not return within 0.8 s"),
         ("os._exit(3)", "undecided", "ended with status 3"),
         ("raise ValueError('enough')", "undecided", "ValueError: enough"),
     ],

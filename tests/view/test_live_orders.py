@@ -78,7 +78,7 @@ REFUSED = [
     ("set", {"set": {"clock.round_trip_delay": 0.00015}}, "whole number"),
     ("step", {"ticks": 0}, "whole number of ticks"),
     ("pace", {"pace": -1}, "pace"),
-    ("pace", {"pace": 10**30}, "beyond 64 bits"),
+    ("pace", {"pace": 10**30}, "does not fit into 64 bits"),
     ("pause", {"verb": "stop"}, "cannot be used"),
     ("pause", {"run": 1}, "cannot be used"),
 ]

@@ -78,7 +78,7 @@ def read_programs(nodes: Sequence[str], externals: Sequence[str]) -> dict[str, P
                 f"A program can take the place of the {' or the '.join(ROLES)}, but {program.role!r} was given."
             )
         if program.role in found:
-            raise ProgramError(f"The {program.role} was given twice; one program takes its place.")
+            raise ProgramError(f"The {program.role} was given twice; only one program can take its place.")
         found[program.role] = program
     return found
 
@@ -100,7 +100,7 @@ def _read_node(text: str) -> Program:
         raise ProgramError(f"The command of the {role} holds a character that no command can hold.")
     if shutil.which(words[0]) is None:
         raise ProgramError(
-            f"The program of the {role}, {words[0]!r}, is not there or cannot be executed; give its path."
+            f"The program of the {role}, {words[0]!r}, does not exist or cannot be executed; give its path."
         )
     return Program(role, command, words)
 

@@ -76,7 +76,7 @@ class ShownPrints:
             self._read = self._file.stat().st_size
         if not self._said:
             self._said = True
-            self._show([f"More was printed than is shown here; all of it stands in {self._file}."])
+            self._show([f"More was printed than is shown here; all of it is in {self._file}."])
 
     def _show(self, lines: list[str], longest: int = _LONGEST) -> None:
         with contextlib.suppress(OSError, ValueError):  # a terminal that is gone must not end the run

@@ -38,9 +38,9 @@ def check_burden(arguments: Message) -> None:
                 f"A command carries at most {_MOST_VALUES} keys and values, {_DEEPEST} tables deep; this one has more."
             )
         if isinstance(value, str | bytes) and len(value) > _LONGEST:
-            raise ClockError(f"A text in a command has at most {_LONGEST} letters, but one has {len(value)}.")
+            raise ClockError(f"A text in a command has at most {_LONGEST} characters, but one has {len(value)}.")
         if isinstance(value, str) and is_exotic(value):
             raise ClockError(f"{value!r} has a unit that a running loop does not know; it knows {_UNITS}.")
         if isinstance(value, dict) and (odd := [key for key in value if not isinstance(key, str)]):
-            raise ClockError(f"The keys of what a command carries are texts, but {odd[0]!r} was given as one.")
+            raise ClockError(f"The keys in a command must be texts, but {odd[0]!r} was given as one.")
         left += [(one, depth + 1) for one in inner]

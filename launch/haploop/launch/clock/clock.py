@@ -178,7 +178,9 @@ class Clock:
         tick = self.tick_at(at_s)
         self._check_ahead(tick)
         if len(self._scene.event) >= self._most_changes:
-            raise ClockError(f"{MOST_CHANGES} changes wait for their tick already; let time go on, then ask again.")
+            raise ClockError(
+                f"{MOST_CHANGES} changes are already waiting for their tick; let time continue, then ask again."
+            )
         return tick, resolve_event({**change, "at": tick / self._time.control_rate}, self._scene, kinds)
 
     def prepare(self) -> None:
@@ -206,7 +208,7 @@ class Clock:
             )
         if tick >= self.end:
             raise ClockError(
-                f"The run ends at tick {self.end}, {self.end / rate:g} s; nothing can change from there on."
+                f"The run ends at tick {self.end}, {self.end / rate:g} s; nothing can change from then on."
             )
 
     def note(self, event: Event) -> int:

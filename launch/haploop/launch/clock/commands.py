@@ -33,10 +33,10 @@ Answer = tuple[bool, str, Message]
 _MOST_TOLD = 5
 _CHANGES = ("swap", "set", "undo")
 _PROBATION = {
-    "restore": "If it raises or gives no finite number within its first second, what was there before comes back; the "
-    "terminal of the run tells it at once, the log and the summary keep it, with the file and the line. Later, "
-    "the run ends.",
-    "end": "If it raises or gives no finite number, the run ends, and tells the file and the line.",
+    "restore": "If it raises or gives no finite number within its first second, what was there before is restored; the "
+    "terminal of the run reports this at once, and the log and the summary record it, with the file and the line. "
+    "If this happens later, the run ends.",
+    "end": "If it raises or gives no finite number, the run ends and reports the file and the line.",
 }
 
 
@@ -76,7 +76,7 @@ class Commands:
         if self._spec.clock == device_time.PLANT and (why := device_time.refusal(verb, arguments)):
             return False, why, {}
         if act is None:
-            return False, f"{verb[:40]!r} is no command; these are: {', '.join(self._verbs)}.", {}
+            return False, f"{verb[:40]!r} is not a command; the commands are: {', '.join(self._verbs)}.", {}
         try:
             check_names(verb, act, arguments)
             check_burden(arguments)
@@ -145,7 +145,7 @@ class Commands:
         if isinstance(ticks, bool) or not isinstance(ticks, int) or not 1 <= ticks <= longest:
             given = repr(ticks)[:40]
             raise ClockError(
-                f"A step goes on for a whole number of ticks from 1 to {longest}, but {given} was asked for."
+                f"A step lasts for a whole number of ticks from 1 to {longest}, but {given} was asked for."
             )
         self._clock.note({"step": ticks})
         tick = self._clock.step(ticks)
@@ -171,7 +171,7 @@ class Commands:
             return self._swap_tried(change, at, reload)
         if reload:
             known = ", ".join(sorted(self._spec.plugin_sources)) or "none"
-            says = f"Only kinds from files that the run was started with by --plugin can be reloaded ({known})"
+            says = f"Only kinds from files given by --plugin when the run was started can be reloaded ({known})"
             raise ClockError(f"{says}, but {kind} was asked for.")
         before = self._clock.scene_at(self._clock.tick_at(at)).dissipation
         done = self._swapped(change, before, self._clock.change(change, at))
@@ -222,7 +222,7 @@ class Commands:
 
     def _set(self, set: dict[str, float], at: float | None = None) -> tuple[str, Message]:
         if set == {}:
-            raise ClockError("Nothing was set: a set names a key at least, with its value, such as wall.stiffness.")
+            raise ClockError("Nothing was set: a set names at least one key with its value, such as wall.stiffness.")
         before = self._clock.scene_at(self._clock.tick_at(at))
         tick = self._clock.change({"set": set}, at)
         back = {key: value_at(before, key) for key in set}
@@ -242,14 +242,15 @@ class Commands:
         An element comes back with the parameters it had, but starts afresh: what it remembered is lost.
         """
         if not self._undo_by:
-            raise ClockError("There is nothing to undo: no swap and no set that a command asked for is left.")
+            raise ClockError("There is nothing to undo: no swap or set requested by a command is left.")
         asked, back, code = self._undo_by[-1]
         units = units_at(self._clock.present(), self._spec.kinds)
         what = describe(asked, units)
         if back is None:
             raise ClockError(
-                f"The last change, {what}, cannot be undone: the elements after it have moved up, and no swap puts one "
-                "between others. What was changed before it cannot be undone past it; swap and set still can change it."
+                f"The last change, {what}, cannot be undone: the elements after it have moved up, and no swap inserts "
+                "one between others. Earlier changes cannot be undone past it; swap and set can still change what they "
+                "changed."
             )
         if self._clock.withdraw(asked):
             self._settle(withdrawn=asked)

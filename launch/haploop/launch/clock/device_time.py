@@ -12,8 +12,8 @@ from haploop.protocol.transport.wire import Message
 PLANT = "plant"
 # Commands that would halt a device's time or hurry it.
 REFUSED = ("pause", "resume", "step", "pace")
-GOES_ON = "The plant owns the time of this run, which goes on by its own clock; `haploop stop` ends it."
-DELAY_STAYS = "The delay is the time that the answers to a device have; it stays what the run began with."
+GOES_ON = "The plant owns the time of this run, which advances by the clock of the plant; `haploop stop` ends it."
+DELAY_STAYS = "The delay is the time available for the answers to a device; it stays as it was when the run began."
 _SECONDS = ("median_s", "percent_99_s", "percent_99_9_s", "most_s", "late_s", "lost_s")
 _COUNTS = ("ticks", "late_ticks")
 
@@ -24,13 +24,13 @@ def check_owner(spec: RunSpec) -> None:
         return
     if PLANT not in spec.programs:
         raise OutputError(
-            "--clock plant needs a plant that keeps the time, by --node plant=COMMAND or --external plant; the run's "
-            "own plant keeps none, but --pace 1 does."
+            "--clock plant needs a plant that keeps the time, given by --node plant=COMMAND or --external plant; "
+            "the run's own plant does not keep time, but --pace 1 does."
         )
     if not math.isinf(spec.pace):
-        raise OutputError("--clock plant leaves the time to the plant, --pace keeps it; leave out one of them.")
+        raise OutputError("--clock plant leaves the time to the plant, but --pace sets it; leave out one of them.")
     if any(event.pause for event in spec.scene.event):
-        raise OutputError("--clock plant was asked for, but an [[event]] of the scene pauses; a device does not.")
+        raise OutputError("--clock plant was asked for, but an [[event]] of the scene pauses; a device does not pause.")
     if any(DELAY in (event.set or {}) for event in spec.scene.event):
         raise OutputError(f"--clock plant was asked for, but an [[event]] sets {DELAY}. {DELAY_STAYS}")
 

@@ -30,7 +30,7 @@ def why_refused(request: Message, program: Message, secret: str, roster: Roster,
     role, endpoints = request["role"], request["endpoints"]
     binds = PROCESSES[role].binds if role in PROCESSES else None
     if binds is not None and request["secret"] != secret:
-        return f"JOIN as {role}, a role of the run's own process, came with a wrong secret; join as an observer."
+        return f"JOIN as {role}, a role of the run's own processes, came with a wrong secret; join as an observer."
     if binds is not None and roster.own(role):
         return f"The role {role} is taken."
     if binds is None and not has_begun:
@@ -41,10 +41,10 @@ def why_refused(request: Message, program: Message, secret: str, roster: Roster,
         return "JOIN.endpoints must be a map from channel to address."
     if missing := [channel for channel in binds or () if not _is_address(endpoints.get(channel))]:
         names = " and ".join(sorted(missing))
-        return f"JOIN.endpoints of the {role} must have the address, ipc:// or tcp://, of its {names} socket."
+        return f"JOIN.endpoints of the {role} must hold the ipc:// or tcp:// address of its {names} socket."
     if not all(isinstance(v, str) and v.isprintable() and len(v) <= _LONGEST_TEXT for v in program.values()):
         keys = ", ".join(_PROGRAM_KEYS)
-        return f"JOIN.program holds printable texts of at most {_LONGEST_TEXT} characters: {keys}."
+        return f"JOIN.program must hold printable texts of at most {_LONGEST_TEXT} characters: {keys}."
     return ""
 
 

@@ -18,15 +18,15 @@ _LATE_S = 0.001
 _FINEST_S, _FACTOR = 1e-6, 1.05
 # The entries of ``lateness`` of a run at a pace, or of one whose plant owns the time; absent for any other run.
 LATENESS = {
-    "ticks": "ticks whose lateness is known: at a pace, how long after it was due a tick was done; where the plant "
-    "owns the time, how long after its sample was due an answer came",
-    "median_s": "half of the ticks were no later than this; at a pace to 5 %",
-    "percent_99_s": "99 % of the ticks were no later than this; at a pace to 5 %",
-    "percent_99_9_s": "99.9 % of the ticks were no later than this; where the plant owns the time alone",
+    "ticks": "ticks whose lateness is known: at a pace, from when a tick was due until it was done; where the plant "
+    "owns the time, from when its sample was due until an answer came",
+    "median_s": "half of the ticks were no later than this; accurate to 5 % at a pace",
+    "percent_99_s": "99 % of the ticks were no later than this; accurate to 5 % at a pace",
+    "percent_99_9_s": "99.9 % of the ticks were no later than this; only where the plant owns the time",
     "most_s": "lateness of the latest tick",
     "late_ticks": "ticks that were later than `late_s`",
-    "late_s": "from when on a tick counts as late; at a pace 1 ms, or a period where that is longer",
-    "lost_s": "real time by which the schedule was put off, since a stall is not made up for",
+    "late_s": "lateness beyond which a tick counts as late; at a pace 1 ms, or a period where that is longer",
+    "lost_s": "real time by which the schedule was delayed, since a stall is not made up for",
     "clock": "`plant` where the plant owned the time; absent otherwise",
 }
 

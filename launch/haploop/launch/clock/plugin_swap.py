@@ -42,7 +42,7 @@ def swap_plugin(
         if kind not in found:
             raise ClockError(f"{source} no longer defines {kind}, but {', '.join(found)}; the old element stays.")
         if taken := [each for each in found if each in spec.kinds and spec.plugin_sources.get(each) != source]:
-            why = f"{source} defines {taken[0]} now, a kind that the run has from elsewhere; give it a name of its own"
+            why = f"{source} now defines {taken[0]}, a kind that the run has from another source; give it another name"
             raise ClockError(f"{why}. The old element stays.")
         _, event = clock.resolved(change, at_s, {**spec.kinds, **found} if reload else spec.kinds)
         assert event.swap

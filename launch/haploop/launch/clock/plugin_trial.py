@@ -87,7 +87,7 @@ class PluginTrial:
 
         Raises PluginError if it does not load, ends its process, or does not finish within the limit.
         """
-        when = "as it loaded"
+        when = "while it was being loaded"
         reply = yield from self._ask({"source": self._source, "origin": self._origin}, when, PluginError)
         self.brings = reply.get("brings") is True
         try:
@@ -100,7 +100,7 @@ class PluginTrial:
         asked = [[element.name, dict(element.parameters)] for element in elements]
         names = " and ".join(f"the element {name}" for name, _ in asked)
         if asked:
-            yield from self._ask({"make": asked}, f"as {names} was made and gave a force at rest", ElementError)
+            yield from self._ask({"make": asked}, f"while {names} was being made and tried at rest", ElementError)
 
     def _ask(self, request: Mapping[str, Any], when: str, kind: type[Exception]) -> Generator[None, None, Any]:
         to_send, answer = json.dumps(request).encode() + b"\n", b""
@@ -114,7 +114,7 @@ class PluginTrial:
                 if not data or len(answer) > _LARGEST:
                     raise kind(f"The plugin {self._origin} ended the process it was tried in {when}: {self._end()}.")
             if time.monotonic() > give_up:
-                raise kind(f"The plugin {self._origin} was given up: {self._limit_s:g} s were not enough {when}.")
+                raise kind(f"The plugin {self._origin} was stopped: it took longer than {self._limit_s:g} s {when}.")
             yield
         try:
             reply = json.loads(answer)
@@ -127,7 +127,7 @@ class PluginTrial:
         return reply
 
     def _forged(self, when: str) -> str:
-        return f"The plugin {self._origin} answered for the process it was tried in {when}."
+        return f"The plugin {self._origin} answered in place of the process it was tried in {when}."
 
     def _end(self) -> str:
         try:

@@ -84,7 +84,7 @@ class Roster:
     def others_than(self, role: str) -> str:
         """Returns a sentence that names the foreign programs in other roles; "" if there are none."""
         labels = [program.label for program in self._programs.values() if program.role != role]
-        return f" With it ran the {' and the '.join(labels)}, not haploop's own." if labels else ""
+        return f" Not haploop's own in this run: the {' and the '.join(labels)}." if labels else ""
 
     def is_external(self, role: str) -> bool:
         """Tells whether a program that the launcher does not start takes this role."""

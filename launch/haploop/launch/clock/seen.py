@@ -13,8 +13,8 @@ from haploop.protocol.transport.wire import Message
 # Part of the 5 s for which a terminal waits for its answer.
 _PATIENCE_S = 3.0
 _NOT_YET = {
-    "logger": "; not all of this loop is haploop's own, and whether it carries this out is seen when the tick is done",
-    "controller": "; it is tried on the motion of that tick when time gets there",
+    "logger": "; not all of this loop is haploop's own, so the end of that tick will show whether this is carried out",
+    "controller": "; it will be tried on the motion of that tick when time reaches it",
 }
 
 

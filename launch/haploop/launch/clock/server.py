@@ -180,7 +180,7 @@ class ClockServer:
             self._refuse(sender, f"{frame.name} came from somebody who has not joined; send JOIN first.")
             return
         if frame.name in ("READY", "PROGRESS") and not 0 <= frame.fields[0] <= self._clock.until:
-            self._refuse(sender, f"{frame.name} must name a tick from 0 to {self._clock.until}, which is granted.")
+            self._refuse(sender, f"{frame.name} must name a granted tick, from 0 to {self._clock.until}.")
             return
         node.heard = self._machine.now()
         node.waits_for = ""

@@ -42,7 +42,7 @@ class Awaited:
         while missing := [role for role in self._roles if not roster.own(role)]:
             left_s = give_up - self._machine.now()
             if left_s <= 0:
-                why = f"No program joined as the {' and the '.join(missing)} within {wait_s:g} s; --wait gives it more."
+                why = f"No program joined as the {' and the '.join(missing)} within {wait_s:g} s; --wait allows more."
                 raise NeverBegan(" ".join([why, *(roster.refused[role] for role in missing if role in roster.refused)]))
             self._server.socket.poll(min(_LOOK_MS, max(1, int(1000 * left_s))))
             self._server.serve()

@@ -79,7 +79,7 @@ class Child:
         try:
             code = self._process.wait(timeout=1.0)
         except subprocess.TimeoutExpired:
-            return "closed what it was given but still runs"
+            return "closed the pipe that shows it is alive but still runs"
         if code < 0:
             return f"was killed by {signal.Signals(-code).name if -code in _NAMED else f'signal {-code}'}"
         return f"ended with exit status {code}"

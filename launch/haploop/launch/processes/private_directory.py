@@ -24,7 +24,7 @@ _OWNER = b"haploop"
 _NAME = re.compile(r"[0-9a-f]{6}")
 # A socket's path must stay below the kernel's 107 bytes; this leaves room for the run and the socket's name.
 _LONGEST_BASE = 70
-_ADVICE = "set XDG_RUNTIME_DIR to a directory of yours."
+_ADVICE = "set XDG_RUNTIME_DIR to a directory that you own."
 
 
 def base_directory() -> Path:
@@ -49,7 +49,7 @@ def base_directory() -> Path:
     if status.st_uid != os.getuid() or status.st_mode & 0o777 != 0o700:
         raise OutputError(
             f"{candidate} must belong to you alone (mode 0700), but it belongs to user {status.st_uid} with mode "
-            f"{status.st_mode & 0o777:04o}; mend it with chmod 700, or {_ADVICE}"
+            f"{status.st_mode & 0o777:04o}; repair it with chmod 700, or {_ADVICE}"
         )
     return candidate
 

@@ -137,7 +137,7 @@ def find(which: str | Elsewhere | None) -> LiveRun:
         raise RunNotFound("No run is live; start one with haploop run SCENE.")
     if not fitting:
         raise RunNotFound(f"No live run has the id or the name {run_id}; these are live:\n{listing}")
-    raise RunNotFound(f"{len(fitting)} runs are live; name one with --run ID, in Python attach(ID):\n{listing}")
+    raise RunNotFound(f"{len(fitting)} runs are live; name one with --run ID, or in Python with attach(ID):\n{listing}")
 
 
 def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
@@ -167,9 +167,9 @@ def ask(run: LiveRun, verb: str, **arguments: Any) -> tuple[str, Message]:
             raise RunNotFound(f"Run {_named(run)} has not answered for {answer_ms // 1000} s.")
         frame = decode(socket.recv())
     except WireError as error:
-        raise RunNotFound(f"Run {run.id} answered with something else: {error}") from error
+        raise RunNotFound(f"Run {run.id} gave an unexpected answer: {error}") from error
     except (OverflowError, ValueError) as error:  # what msgpack refuses to carry
-        why = "a whole number is beyond 64 bits" if isinstance(error, OverflowError) else str(error)
+        why = "an integer does not fit into 64 bits" if isinstance(error, OverflowError) else str(error)
         raise CommandRefused(f"A message cannot carry this command: {why}.") from error
     except zmq.ZMQError as error:
         raise RunNotFound(f"Run {run.id} cannot be reached at {run.clock}: {error.strerror}.") from error
@@ -195,7 +195,7 @@ def _reach(place: Elsewhere) -> LiveRun:
         data = ask(run, "status")[1]
         return replace(run, title=str(data["title"]), out=str(data["out"]))
     except (CommandRefused, LookupError) as error:
-        raise RunNotFound(f"What answers at {run.id} is no run of this version of haploop: {error}") from error
+        raise RunNotFound(f"What answers at {run.id} is not a run of this version of haploop: {error}") from error
 
 
 def _pid_namespace() -> str:

@@ -9,8 +9,8 @@ from haploop.launch.spec import RunFailed
 # What a node may take to start, s.
 START_DEADLINE_S = 20.0
 
-_WITHOUT_YOU = "the run goes on without you."
-_ENDS_WITHOUT_YOU = "what is left is kept for you no longer."
+_WITHOUT_YOU = "the run continues without you."
+_ENDS_WITHOUT_YOU = "the rest is no longer kept for you."
 
 
 def late_observers(
@@ -28,7 +28,7 @@ def late_observers(
         if node.is_own or not node.lossless:
             continue
         if now - node.heard > deadline_s and node.tick <= roster.slowest():
-            late.append((node, f"Nothing was heard of you for {deadline_s:g} s; {_WITHOUT_YOU}"))
+            late.append((node, f"Nothing was heard from you for {deadline_s:g} s; {_WITHOUT_YOU}"))
         elif ended_at is not None and now - max(node.moved, ended_at) > deadline_s:
             late.append((node, f"You took nothing for {deadline_s:g} s after the end; {_ENDS_WITHOUT_YOU}"))
         elif not node.ready and now - node.joined > START_DEADLINE_S:
@@ -66,7 +66,7 @@ class Standstill:
         if now - self._since > deadline_s:
             owed = " protocol/README.md says what a node owes the others." if roster.others_than("") else ""
             raise RunFailed(
-                f"For {deadline_s:g} s no tick was done, though all nodes speak: {'; '.join(map(self._told, own))}."
+                f"For {deadline_s:g} s no tick was done, though all nodes respond: {'; '.join(map(self._told, own))}."
                 + owed
             )
 

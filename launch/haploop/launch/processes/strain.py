@@ -9,10 +9,10 @@ from pathlib import Path
 _STATES = {
     "T": " It is stopped, by a signal or a debugger.",
     "t": " It is stopped, by a signal or a debugger.",
-    "D": " It waits for a disk, or another device.",
+    "D": " It is waiting for a disk or another device.",
 }
-_STARVED = " It was ready to go on, but got next to no processor time."
-_AT_WORK = " It was at work all the while."
+_STARVED = " It was ready to run, but got almost no processor time."
+_AT_WORK = " It was working the whole time."
 _BUSY = " The machine was busy: load average {:.0f} on {} cores."
 # Shares of the time for which a process had a processor: with less than the first it was kept waiting for one, with
 # more than the second it was working.

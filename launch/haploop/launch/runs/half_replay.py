@@ -26,13 +26,13 @@ from haploop.protocol.scene.scene import Scene, accelerometer_is_used, hand_is_u
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.wire import Message
 
-_SAME = "Haploop's own {} would have done the same there, to the bit."
+_SAME = "Haploop's own {} would have done the same in its place, bit for bit."
 _OTHER_FORCES = (
     "Haploop's own controller would have answered the same samples with forces that differ by up to {:.3g} N, "
     "first at {:g} s."
 )
-_OTHER_WAY = "Haploop's own plant would have been up to {:.3g} m elsewhere under the same commands."
-_NO_PROGRAMS = f"What the log holds as {PROGRAMS} is none of a run: it should name its programs by role."
+_OTHER_WAY = "Haploop's own plant would have deviated by up to {:.3g} m under the same commands."
+_NO_PROGRAMS = f"The attachment {PROGRAMS} in the log is not that of a run: it should name the programs by role."
 _UNKNOWN: Message = {"name": "", "version": "", "command": ""}
 _PROGRAM = {"name": str, "version": str, "command": str, "own": bool}
 

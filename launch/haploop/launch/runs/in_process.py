@@ -77,7 +77,7 @@ def run_in_process(
     except Exception as error:
         if not (why := raised_in_file(error)):
             raise
-        loop.fail(f"What a plugin file brings failed: {why}")
+        loop.fail(f"Code from a plugin file failed: {why}")
     return loop.judged(out, causes)
 
 

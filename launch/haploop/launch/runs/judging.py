@@ -18,8 +18,8 @@ from haploop.launch.stability.looks import LOOKS_S
 from haploop.protocol.changes import Event
 from haploop.protocol.scene.scene import Scene
 
-_DIED = "The process that judged it ended with status {}."
-_HANGS = "The code of its plugins did not come back within {:g} s as it was judged."
+_DIED = "The process that judged the run ended with status {}."
+_HANGS = "The code of its plugins did not return within {:g} s while the run was being judged."
 # An exchange may take this many times the silence that a run tolerates in a node: nobody waits for its forces.
 _PATIENCE = 4.0
 

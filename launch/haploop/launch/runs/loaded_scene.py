@@ -22,7 +22,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Tables
 
 Values = Mapping[str, Any] | Iterable[str]
-SET_SO = 'Values are set by key: set({"wall.stiffness": 200}), in mid-run set({"wall.stiffness": "0.2 N/mm"}, at=0.5).'
+SET_SO = 'Values are set by key: set({"wall.stiffness": 200}); mid-run, set({"wall.stiffness": "0.2 N/mm"}, at=0.5).'
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,11 +25,11 @@ from haploop.protocol.scene.scene import Scene, accelerometer_is_used
 from haploop.protocol.transport.wire import Message
 
 _NO_READINGS = (
-    "The controller of this run cannot be repeated: what it was sent of the accelerometer is not in the log, which "
+    "The controller of this run cannot be repeated: the accelerometer samples sent to it are not in the log, which "
     'holds the readings only with acceleration.source = "accelerometer" and no cutoff'
 )
 
-_TOLD_OTHERWISE = "Either the log was changed, or the controller sent other forces than it told."
+_TOLD_OTHERWISE = "Either the log was changed, or the controller sent other forces than it reported."
 
 
 class ReplayError(Exception):
@@ -79,7 +79,7 @@ def replay(directory: Path) -> Replay:
         except LogError as error:
             why = getattr(error.__cause__, "strerror", None) or "it could not be written"
             raise LogError(
-                f"The repetition keeps a log in {scratch} meanwhile: {why}. Make room or set TMPDIR."
+                f"The repetition keeps a temporary log in {scratch}: {why}. Free some space or set TMPDIR."
             ) from error
         repeated = haploop.logger.read(scratch)
     failed = before is not None and before["ended"] == "failed"
@@ -144,8 +144,8 @@ def demand_own(recorded: Recording, scene: Scene) -> None:
     """Raises ReplayError if plant or controller of a run was a foreign program, so that its loop cannot be judged."""
     if foreign := foreign_programs(recorded, scene):
         raise ReplayError(
-            f"Whether this loop is stable cannot be said: {named(foreign)}, "
-            "which cannot be held still and pushed here. What its last half second showed is in its summary."
+            f"Whether this loop is stable cannot be determined: {named(foreign)}, "
+            "which cannot be held still and pushed here. Its summary holds what its last half second showed."
         )
 
 
@@ -161,7 +161,7 @@ def repeatable(directory: Path, recorded: Recording) -> tuple[Scene, dict[str, t
     kinds = registry(_launch_plugins(directory, recorded))
     scene = recorded_scene(directory, recorded.attachments, kinds)
     if scene is None:
-        raise ReplayError(f"{directory} holds no {SCENE}; a directory that haploop run has written was expected.")
+        raise ReplayError(f"{directory} holds no {SCENE}; a directory written by haploop run was expected.")
     events = [_event(dict(event), directory) for event in recorded.get("/events", [])]
     # A run that was cut off is repeated as far as its log goes.
     return scene, kinds, [*events, (len(recorded["/controller"]["x"]), {"stop": True})]
@@ -175,7 +175,7 @@ def _compare_scenes(directory: Path, recorded: Recording) -> list[str]:
         same = read_file(file) == held
     except OSError as error:
         return [f"{file} cannot be read: {error.strerror}."]
-    return [] if same else [f"{file} is not the scene that the log holds, from which the run was repeated."]
+    return [] if same else [f"{file} differs from the scene in the log, from which the run was repeated."]
 
 
 def _launch_plugins(directory: Path, recorded: Recording) -> list[Path]:
@@ -190,7 +190,7 @@ def _kept_plugin(directory: Path, name: str) -> Path:
     if not path.is_file():
         raise ReplayError(f"{path} is missing; the run cannot be repeated without its plugin.")
     if kept_name(path) != path.name:
-        raise ReplayError(f"{path} is no longer what the run was made with; the run cannot be repeated.")
+        raise ReplayError(f"{path} has changed since the run was made; the run cannot be repeated.")
     return path
 
 

@@ -131,11 +131,11 @@ def run(
     """
     if out is not None and not isinstance(out, str | Path):
         raise TypeError(
-            f"out must be a directory, but {out!r:.60} was given; a scene is changed by load(scene).set(...)."
+            f"out must be a directory, but {out!r:.60} was given; to change a scene, use load(scene).set(...)."
         )
     scene = scene if isinstance(scene, LoadedScene) else load(scene)
     if math.isfinite(pace) and not processes:
-        raise ValueError(f"A pace of {pace:g} needs the clock of a run as processes; give processes=True too.")
+        raise ValueError(f"A pace of {pace:g} needs the clock of a run in processes; give processes=True too.")
     bring(scene.brought)
     if out is None and not processes:
         memory = MemoryLog()

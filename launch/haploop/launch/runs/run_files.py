@@ -43,7 +43,7 @@ def recorded_scene(
         try:
             tables = tomllib.loads(attachments[SCENE].decode())
         except (ValueError, RecursionError) as error:
-            raise SceneError([Mistake(str(path), "", "", "The scene that the log holds is no TOML.")]) from error
+            raise SceneError([Mistake(str(path), "", "", "The scene in the log is not TOML.")]) from error
     elif path.exists():
         tables = parse(path)
     else:
@@ -79,12 +79,12 @@ def recorded_log(directory: Path) -> Recording:
     for topic in _COLUMNS.keys() & log.keys():
         lacking = sorted(_COLUMNS[topic] - log[topic].keys()) if isinstance(log[topic], Table) else ["columns"]
         if lacking:
-            raise LogError(f"The log in {directory} is none of a run: {topic} lacks {', '.join(lacking)}.")
+            raise LogError(f"The log in {directory} is not that of a run: {topic} lacks {', '.join(lacking)}.")
     try:
         events = [(int(event["tick"]), event) for event in log.get("/events", []) if event["timestamp"] >= 0]
         changes_of(events)
     except (LookupError, TypeError, ValueError, AttributeError) as error:
-        raise LogError(f"The log in {directory} is none of a run: an event in it cannot be read.") from error
+        raise LogError(f"The log in {directory} is not that of a run: an event in it cannot be read.") from error
     return log
 
 
@@ -115,7 +115,7 @@ def recorded_summary(directory: Path) -> Summary | None:
         by = summary.get("versions")
         version = by.get("haploop", "") if isinstance(by, dict) else ""
         raise LogError(
-            f"The summary {path} is none of a run of this version of haploop: {key} is missing or of another type"
-            f"{f' (it was written by version {version})' if version else ''}. Without the file the log reads by itself."
+            f"The summary {path} is not that of a run of this version of haploop: {key} is missing or of the wrong type"
+            f"{f' (it was written by version {version})' if version else ''}. Without the file the log can be read."
         )
     return summary

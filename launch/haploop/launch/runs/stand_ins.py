@@ -78,17 +78,17 @@ class _Wall(Wall):
 class _Estimator(Estimator):
     """Stands in for an unknown estimator: it estimates nothing."""
 
-    does: ClassVar[str] = "that of a kind which is not here"
+    does: ClassVar[str] = "that of a kind which is not installed here"
 
     @classmethod
     def from_scene(cls, scene: Any, of: str, period_s: float) -> Any:
-        raise UnknownKind(f"The estimator {cls.name} is not here.")
+        raise UnknownKind(f"The estimator {cls.name} is not installed here.")
 
     def start(self, u: Any, sample: Any) -> Any:
-        raise UnknownKind(f"The estimator {self.name} is not here.")
+        raise UnknownKind(f"The estimator {self.name} is not installed here.")
 
     def step(self, memory: Any, u: Any, sample: Any) -> Any:
-        raise UnknownKind(f"The estimator {self.name} is not here.")
+        raise UnknownKind(f"The estimator {self.name} is not installed here.")
 
 
 def elements_for(tables: Tables) -> dict[str, type[Element]]:

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from haploop.logger.summary import Summary
     from haploop.protocol.changes import Event
 
-_NOT_OURS = "By its window alone, since {} not haploop's own and cannot be gone through again here."
-_NOT_REPEATED = "By its window alone, since the run is longer than {:g} s (haploop judge goes through it again)."
+_NOT_OURS = "By its window alone, since {} not haploop's own and cannot be run again here."
+_NOT_REPEATED = "By its window alone, since the run is longer than {:g} s (haploop judge runs it again)."
 
 
 def prepare(

@@ -201,7 +201,7 @@ def _as_before(before: list[Any], after: BatchState) -> list[Any]:
     """Returns the leaves of a state in the shapes and types that they had before the tick."""
     leaves = tree_leaves(after)
     if len(leaves) != len(before):
-        raise NotCompilable("What is remembered grows from tick to tick.")
+        raise NotCompilable("The state grows from tick to tick.")
     kept = []
     for old, leaf in zip(before, leaves, strict=True):
         new = jnp.asarray(leaf)
