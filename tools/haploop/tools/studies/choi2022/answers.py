@@ -1,4 +1,4 @@
-"""Answers of long calculations, kept beside the figures: a study that was stopped goes on where it was."""
+"""Answers of long calculations, kept beside the figures: a study that was stopped continues where it was."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from haploop.tools.render.progress import Stage, silent
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
 FOLDER = "answers"
-# What an answer hangs on; of this study all but its figures, which only draw and tell.
+# What an answer depends on; of this study everything except its figures, which only draw and report.
 _PROGRAM = tuple(
     f"haploop.{name}"
     for name in ["protocol", "plant", "controller", "logger", "launch", "tools.linear", "tools.search"]
@@ -26,26 +26,26 @@ _PROGRAM = tuple(
 
 
 class Job(NamedTuple):
-    """A call of which the answer goes to a file."""
+    """A call whose answer goes to a file."""
 
     call: Callable[[Any], Any]
     item: Any
     file: Path
 
     def keep(self) -> None:
-        """Answers, and writes the file whole or not at all."""
+        """Computes the answer, and writes the file whole or not at all."""
         unfinished = self.file.with_suffix(f".{os.getpid()}")
         unfinished.write_bytes(pickle.dumps(self.call(self.item)))
         unfinished.replace(self.file)
 
 
 class Answers:
-    """Calls of importable functions on processes; an answer of the same program in the directory is not asked again.
+    """Calls of importable functions in processes; an answer that this program left in the directory is not recomputed.
 
     Args:
         out: directory of the figures.
-        small: whether calculations of seconds are wanted, with fewer runs; they need not come to the same.
-        workers: processes; as many as there are cores when None.
+        small: whether calculations of seconds are wanted, with fewer runs; their results may differ.
+        workers: number of processes; as many as there are cores when None.
     """
 
     def __init__(self, out: Path, *, small: bool = False, workers: int | None = None, stage: Stage = silent) -> None:
@@ -53,7 +53,7 @@ class Answers:
 
     @cached_property
     def folder(self) -> Path:
-        """The folder of this program's answers: another program's are another's."""
+        """The folder of this program's answers; a different program has a different folder."""
         here = Path(__file__).parent
         scenes = (bundled_folder(name) for name in ("scenes", "hands", "devices"))
         files = [
@@ -64,9 +64,9 @@ class Answers:
         return self.out / FOLDER / source_digest(_PROGRAM, sorted(files))
 
     def map_parallel(self, name: str, call: Callable[[Item], Answer], items: Sequence[Item]) -> list[Answer]:
-        """Returns what a function returns for each item, in their order.
+        """Returns what a function returns for each item, in the order of the items.
 
-        Items are told apart by their ``repr``, which therefore has to say all of them: no arrays.
+        Items are distinguished by their ``repr``, which must therefore show all of an item: no arrays.
         """
         assert ".figures." not in call.__module__, "what figures/ computes is not known by its source"
         self.folder.mkdir(parents=True, exist_ok=True)

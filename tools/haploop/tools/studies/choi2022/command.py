@@ -17,9 +17,9 @@ from haploop.tools.studies.choi2022.figures.work import Kept, Work
 
 
 def paper(wanted: Sequence[int], out: Path, small: bool, workers: int | None) -> None:
-    """Makes some figures, all when none is named, and writes the pages of what the directory then holds.
+    """Makes some figures, all if none is named, and writes the pages from what the directory then holds.
 
-    What was calculated before by the same program is read back (``answers``).
+    Earlier calculations by the same program are read back (``answers``).
     """
     there = numbers()
     for number in wanted:
@@ -42,8 +42,8 @@ def paper(wanted: Sequence[int], out: Path, small: bool, workers: int | None) ->
 def main() -> None:
     """``python -m haploop.tools.studies.choi2022.command RUN DOCS``: takes a run into the documentation.
 
-    Pictures and findings are copied to DOCS/paper, and the pages are written. With DOCS/paper itself for RUN only the
-    pages are written anew, from its findings and the words of the page: in a second.
+    Pictures and findings are copied to DOCS/paper, and the pages are written. If RUN is DOCS/paper
+    itself, only the pages are written again, from its findings and the texts of the page, which takes a second.
     """
     if len(sys.argv) != 3:
         leave("Two directories were expected: that of a haploop paper, and where the page goes.", WRONG_USE)
@@ -62,7 +62,7 @@ def main() -> None:
 
 
 def _taken(kept: Mapping[int, Kept]) -> list[str]:
-    """Returns the files of a run that the documentation takes: findings and pictures."""
+    """Returns the files of a run that go into the documentation: findings and pictures."""
     shown = [name for one in kept.values() for name in one["files"] if name.endswith(".png")]
     return [*(f"figure_{number}.json" for number in kept), *shown]
 

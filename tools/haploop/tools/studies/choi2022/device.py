@@ -1,6 +1,6 @@
-"""A PHANToM Premium 1.5 in a hand that taps and presses a wall, with all that nobody published as numbers to choose.
+"""A PHANToM Premium 1.5 in a hand that taps and presses a wall; everything that was not published is a free number.
 
-The nearest interpretation of it is a scene file: launch/scenes/premium_press.toml.
+Its nearest interpretation is a scene file: launch/scenes/premium_press.toml.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ _PLACES = {"motor": "the near side, that of the rotor", "tip": "the motor's body
 # Published: Cavusoglu et al. 2002 (mass, viscous and dry friction of the joint with its motor, at the tip); Fu
 # and Cavusoglu 2012 (the hand).
 MASS_KG, DAMPING_N_S_M, FRICTION_N, HAND_KG = 0.0525, 0.0114, 0.048, 0.269
-# Bandwidth in Hz and what is left of the delay in s, by the filter setting of an MPU-9250 (its data sheet: 0.50, 1.38
-# and 1.88 ms in all, of which a first-order filter of that bandwidth is 0.15, 0.38 and 0.73 ms).
+# Bandwidth in Hz and the rest of the delay in s, by the filter setting of an MPU-9250 (its data sheet: 0.50, 1.38 and
+# 1.88 ms in total, of which a first-order filter of that bandwidth causes 0.15, 0.38 and 0.73 ms).
 UNITS: dict[str, tuple[float | None, float]] = {
     "ideal": (None, 0.0),
     "1046 Hz": (1046.0, 0.0003),
@@ -45,23 +45,23 @@ VELOCITIES: dict[str, float | None] = {"none": None, "200 Hz": 200.0, "50 Hz": 5
 class Setup:
     """An interpretation of the experiments: one value for each thing that is not published.
 
-    Two masses on an elastic drive ring at mode_Hz = sqrt(k / mu) / 2 pi, mu = m_1 m_2 / (m_1 + m_2), with the damping
-    ratio d / (2 sqrt(k mu)). The near one carries actuator, encoder and friction.
+    Two masses on an elastic drive vibrate at mode_Hz = sqrt(k / mu) / 2 pi, mu = m_1 m_2 / (m_1 + m_2), with the
+    damping ratio d / (2 sqrt(k mu)). The near one carries actuator, encoder and friction.
 
     Attributes:
-        mode_Hz: frequency of the drive's mode, the device in no hand.
-        near_share: the near mass over both.
-        mode_damping: ratio of the mode's damping to the critical.
-        push_N: force of the hand, pressing.
+        mode_Hz: frequency of the drive's mode, with the device in no hand.
+        near_share: the near mass as a share of both.
+        mode_damping: ratio of the mode's damping to its critical damping.
+        push_N: force with which the hand presses.
         entry_m_s: speed at which the wall is met.
         hand: share of the published hand's mass, damping and stiffness.
         delay_s: extra delay of the loop, beyond the hold.
         unit: setting of the inertial unit, a key of ``UNITS``.
-        mount: the mass the unit is on, "motor" (near) or "tip" (far).
+        mount: the mass that carries the unit, "motor" (near) or "tip" (far).
         velocity: low-pass over the encoder's differences, a key of ``VELOCITIES``.
         acceleration: "unit", or "encoder" for differences of the velocity, which the paper found too noisy.
-        friction_N: Coulomb friction at the near mass (published: 0.048 N); 0 leaves it out, which is some forty times
-            cheaper to run.
+        friction_N: Coulomb friction at the near mass (published: 0.048 N); 0 leaves it out, which makes a run some
+            forty times cheaper.
     """
 
     mode_Hz: float
@@ -79,7 +79,7 @@ class Setup:
 
     @classmethod
     def from_scene(cls, scene: Scene) -> Self:
-        """Reads it from a scene made by ``scene``, or from its file; numbers to three digits."""
+        """Reads a setup from a scene made by ``scene``, or from its file; numbers to three digits."""
         drive, unit, hand = scene.transmission, scene.accelerometer, hand_of(scene)
         if not (drive and unit and isinstance(hand.force, Constant)):
             raise ValueError("A setup has a drive, an inertial unit and a hand that presses.")
@@ -104,7 +104,7 @@ class Setup:
         return asdict(self)
 
     def scene(self, stiffness: float, elements: Elements = ()) -> Scene:
-        """Returns the resolved scene with a wall of this stiffness in N/m."""
+        """Returns the resolved scene of this setup with a wall of this stiffness in N/m."""
         base, unit = shipped(SCENE_FILE), shipped(SCENE_FILE).accelerometer
         assert unit
         near, far = self.near_share * MASS_KG, (1.0 - self.near_share) * MASS_KG
@@ -132,17 +132,17 @@ class Setup:
         )
 
     def linear_scene(self, elements: Elements = ()) -> Scene:
-        """Returns the scene without friction and encoder, linear in contact where its elements are."""
+        """Returns the scene without friction and encoder; it is linear in contact if its elements are linear."""
         return replace(smooth(self.scene(1.0, elements)), friction=None)
 
 
 def nearest() -> Setup:
-    """Returns the setup of ``premium_press.toml``: that nearest to the paper which the search of Fig. 7 found."""
+    """Returns the setup of ``premium_press.toml``: the one nearest to the paper that the search of Fig. 7 found."""
     return Setup.from_scene(shipped(SCENE_FILE))
 
 
 def elements_of(kind: str, *sizes: float) -> Elements:
-    """Makes one element of a kind of ``KINDS``, damping in N s/m, inertia in kg; of "both" damping and inertia."""
+    """Makes one element of a kind in ``KINDS``, damping in N s/m, inertia in kg; for "both", damping and inertia."""
     if kind == "both":
         return elements_of("damping", sizes[0]) + elements_of("unidirectional-inertia", sizes[1])
     if kind == "nothing":
@@ -179,7 +179,7 @@ def _rounded(value: float, digits: int = 3) -> float:
 
 @cache
 def _hand_times(share: float) -> Hand:
-    """Makes the published hand, so many times as heavy, damped and stiff."""
+    """Makes the published hand with its mass, damping and stiffness scaled by ``share``."""
     file = bundled_folder("hands") / "fu_cavusoglu_y.toml"
     table = tomllib.loads(file.read_text(encoding="utf-8"))["hand"]
     grip, hand = ({key: share * value for key, value in of.items() if key != "grip"} for of in (table["grip"], table))

@@ -1,5 +1,5 @@
 """Interpretations of the experiments (Choi et al. 2022, section V.B): the walls that each element steadies under them,
-which claims hold then, and the search for the one nearest to the paper.
+the claims that then hold, and the search for the one nearest to the paper.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ SPACE = InterpretationSpace.of_figure(
     7,
     # Delays are whole plant steps.
     scales={"delay_s": Scale(1e-4, 0.0, 2e-3)},
-    # As a scene file has them: what is steady may hang on the fourth digit.
+    # As in a scene file: what is steady may depend on the fourth digit.
     digits=3,
     labels={"friction_N": "dry friction (N)", "acceleration": "acceleration of"},
 )
@@ -66,17 +66,17 @@ SIZES: dict[str, tuple[tuple[float, ...], ...]] = {
 # For each element of NAMES the steady sizes, shape (stiffnesses, sizes).
 Steady = dict[str, np.ndarray]
 
-# The largest stiffness in N/m that the paper steadied: Fig. 10 (damping and bidirectional inertia "also 4.5 N/mm"),
-# Fig. 9 (5.5), and section V.B.4 (6.3). Between grid points every 500 N/m, so that a step away is no disagreement.
+# The largest stiffness in N/m steadied in the paper: Fig. 10 (damping and bidirectional inertia "also 4.5 N/mm"),
+# Fig. 9 (5.5), and section V.B.4 (6.3). The grid has a point every 500 N/m, so that one step away is no disagreement.
 PAPER = {"damping": 4500.0, "bidirectional-inertia": 4500.0, "unidirectional-inertia": 5500.0, "both": 6300.0}
-# Section V.B.2 and V.B.4: what was compared in Fig. 8, and the pair of Figs. 11 to 13.
+# Sections V.B.2 and V.B.4: what was compared in Fig. 8, and the pair of Figs. 11 to 13.
 BOOKED_DAMPING, BOOKED_KG, BOOKED_AT_N_M = 2.7, 0.0018, (4500.0, 5000.0)
 PAIR, PAIR_AT_N_M = (2.15, 0.009), 6300.0
 # "Particularly for lower values of inertia": up to the paper's largest.
 LOW_KG = 0.009
-# So small a part of an inertia is booked beside a damper without being felt.
+# This small a part of an inertia is booked beside a damper without being felt.
 _UNFELT = 1e-6
-# What figure 7 leaves for those that follow.
+# Files that figure 7 leaves for the figures after it.
 SHARES, SCENE = "figure_7_shares.json", "figure_7.toml"
 
 
@@ -86,9 +86,9 @@ def setup_of(point: Point) -> Setup:
 
 
 def search(answers: Answers) -> Found:
-    """Searches for the nearest; stages are those of the search, and "nearest".
+    """Searches for the nearest interpretation; the stages are those of the search, and "nearest".
 
-    All are without friction, which takes some forty times as long to run.
+    All are without friction, with which a run takes some forty times as long.
     """
     found = searched(answers, SPACE, measure, SMALL if answers.small else WHOLE, tie=gap_N_m)
     rows = [trial.row for trial in [*found.trials, *found.neighbours]]
@@ -96,16 +96,16 @@ def search(answers: Answers) -> Found:
 
 
 def gap_N_m(row: Row) -> float:
-    """Returns by how much the four largest stiffnesses differ from the paper's, summed."""
+    """Returns the sum of the differences between the four largest stiffnesses and those of the paper."""
     return sum(abs(row[f"{name}_N_m"] - stiffness) for name, stiffness in PAPER.items())
 
 
 def stiffness_ladder(
     setups: Sequence[Setup], stiffnesses: np.ndarray = STIFFNESSES, names: Sequence[str] = NAMES
 ) -> list[Steady]:
-    """Returns for each setup and element which sizes leave which walls steady, up to the first wall that none does.
+    """Returns for each setup and element which sizes steady which walls, up to the first wall that no size steadies.
 
-    The setups are best of one structure, so that they run in one batch; the stiffnesses in N/m go upwards.
+    The setups should share one structure, so that they run in one batch; the stiffnesses, in N/m, increase.
     """
 
     def ask(stiffness: float, going: Sequence[tuple[int, str]]) -> list[list[bool]]:
@@ -121,7 +121,7 @@ def stiffness_ladder(
 
 
 def largest_of(one: tuple[Setup, str]) -> float:
-    """Returns the largest stiffness in N/m that an element steadies, of the sizes that the search tries."""
+    """Returns the largest stiffness in N/m that an element steadies, with the sizes that the search tries."""
     setup, name = one
     [steady] = stiffness_ladder([setup], names=[name])
     return largest(steady[name])
@@ -130,7 +130,7 @@ def largest_of(one: tuple[Setup, str]) -> float:
 def measure(points: Sequence[Point]) -> list[Row]:
     """Returns a row for each point: its setup, the largest stiffnesses, 0.0 for each claim that holds, its distance.
 
-    The points are best of one structure, so that they run in one batch.
+    The points should share one structure, so that they run in one batch.
     """
     setups = [*map(setup_of, points)]
     ladders = stiffness_ladder(setups)
@@ -143,13 +143,13 @@ def measure(points: Sequence[Point]) -> list[Row]:
 
 
 def _booked(setup: Setup, stiffness: float) -> Scene:
-    """Makes the scene of 2.7 N s/m with a millionth of both inertias, whose books are a millionth of theirs."""
+    """Makes the scene of 2.7 N s/m with a millionth of both inertias, whose books are a millionth of the full ones."""
     inertias = elements_of(KINDS[2], _UNFELT * BOOKED_KG) + elements_of(KINDS[3], _UNFELT * BOOKED_KG)
     return setup.scene(stiffness, elements_of(KINDS[1], BOOKED_DAMPING) + inertias)
 
 
 def _stiffest(setup: Setup, steady: np.ndarray) -> Scene:
-    """Makes the scene of the stiffest wall that some pair steadies, with the middle one of the sizes that do."""
+    """Makes the scene of the stiffest wall that some pair steadies, with the middle one of the sizes that steady it."""
     rows = np.flatnonzero(steady.any(axis=1))
     sizes = np.flatnonzero(steady[rows[-1]]) if len(rows) else np.arange(len(SIZES["both"]))
     size = SIZES["both"][int(sizes[len(sizes) // 2])]
@@ -190,13 +190,13 @@ def _row(setup: Setup, steady: Steady, booked: Sequence[Summary], pair: Summary,
     for name, one in zip(("lower", "higher"), taken, strict=True):
         row |= {f"{name} {i}_J": float(one[i]) for i in range(3)}
     shortfalls = {name: float(not holds) for name, holds in found.items()}
-    # Steps of the four stiffnesses from the paper's, beyond one.
+    # Steps by which the four stiffnesses differ from the paper's, beyond one each.
     steps = sum(max(abs(of[name] - stiffness) / STEP_N_M - 1.0, 0.0) for name, stiffness in PAPER.items())
     return row | shortfalls | summed_up(shortfalls, CLAIMS, steps)
 
 
 class Share(TypedDict):
-    """The share of interpretations with a claim, in words with its interval, and what it is likeliest with, or ""."""
+    """Share of interpretations under which a claim holds, as text with its interval, and the likeliest option or ""."""
 
     share: float
     often: str
@@ -204,7 +204,7 @@ class Share(TypedDict):
 
 
 class Shares(TypedDict):
-    """What ``SHARES`` holds: of so many interpretations the share with each claim."""
+    """Content of ``SHARES``: the number of interpretations, and the share of them under which each claim holds."""
 
     small: bool
     interpretations: int
@@ -212,7 +212,7 @@ class Shares(TypedDict):
 
 
 def shares_of(rows: Sequence[Row], small: bool) -> str:
-    """Returns as JSON how often each claim holds, and what it is likeliest with."""
+    """Returns as JSON how often each claim holds, and the option with which it is likeliest to hold."""
     there = options(rows, SPACE)
     kept: Shares = {"small": small, "interpretations": len(rows), "claims": {}}
     for name in CLAIMS:
@@ -223,13 +223,13 @@ def shares_of(rows: Sequence[Row], small: bool) -> str:
 
 
 def shares_in(out: Path, small: bool) -> Shares | None:
-    """Returns what figure 7 left in the directory; None where it was not made, or as a trial if this is none."""
+    """Returns what figure 7 left in the directory; None if it was not made, or not with the same ``small``."""
     file = out / SHARES
     kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else None
     return kept if kept and kept["small"] == small else None
 
 
 def nearest(answers: Answers) -> Setup:
-    """Returns the nearest setup: that which figure 7 left in the directory, else that of ``premium_press.toml``."""
+    """Returns the nearest setup: the one that figure 7 left in the directory, else that of ``premium_press.toml``."""
     found = shares_in(answers.out, answers.small)
     return Setup.from_scene(load(answers.out / SCENE)) if found else nearest_of_scene_file()

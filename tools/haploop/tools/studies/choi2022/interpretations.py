@@ -1,8 +1,8 @@
-"""Interpretations of a paper: one choice for everything that it leaves open, and for which of them its claims hold.
+"""Interpretations of a paper: one choice for everything that it leaves open, and under which of them its claims hold.
 
-What is open is told in ``interpretations.toml``. A table of interpretations has a row each: its choices and numbers by
-key, and by name of each claim how far it falls short of it, 0.0 where the claim holds; ``all``, ``holding`` and
-``distance`` sum that up (``summed_up``).
+``interpretations.toml`` lists what is open. A table of interpretations has one row for each: its choices and numbers by
+key, and by the name of each claim how far it falls short of the claim, 0.0 where the claim holds; ``all``, ``holding``
+and ``distance`` summarize these (``summed_up``).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from haploop.tools.studies.choi2022.answers import Answers
 SEED = 2022
 # An option with fewer interpretations says nothing.
 _FEWEST = 20
-# What falls short of a claim counts for no more than this: a factor of 20.
+# A shortfall counts for no more than this: a factor of 20.
 MOST = 3.0
 
 
@@ -41,11 +41,11 @@ def tables_of(figure: int) -> dict[str, Any]:
 
 @dataclass(frozen=True, kw_only=True)
 class InterpretationSpace(Space):
-    """The space that interpretations are drawn from, with what people call its choices and numbers.
+    """The space from which interpretations are drawn, with labels of its choices and numbers.
 
     Attributes:
-        labels: by key; the unit, where there is one, in brackets at the end.
-        ours: our own interpretation, where there is one.
+        labels: by key; the unit, if there is one, in brackets at the end.
+        ours: our own interpretation, if there is one.
     """
 
     labels: Mapping[str, str]
@@ -53,7 +53,7 @@ class InterpretationSpace(Space):
 
     @classmethod
     def of_figure(cls, figure: int, labels: Mapping[str, str] = MappingProxyType({}), **options: Any) -> Self:
-        """Makes the space of a figure, with labels of other values besides."""
+        """Makes the space of a figure; ``labels`` adds labels of other values."""
         choices, numbers = tables_of(figure)["choices"], tables_of(figure)["numbers"]
         return cls(
             choices={key: tuple(one["options"]) for key, one in choices.items()},
@@ -64,7 +64,7 @@ class InterpretationSpace(Space):
         )
 
     def label(self, key: str) -> str:
-        """Returns what a key is called, without its unit."""
+        """Returns the label of a key, without its unit."""
         return self.labels.get(key, key).partition(" (")[0]
 
     def value(self, key: str, value: Any) -> str:
@@ -105,7 +105,7 @@ def searched(
 def summed_up(shortfalls: Mapping[str, float], claims: Iterable[str], apart: float = 0.0) -> Row:
     """Returns the last columns of a row: whether a claim that counts fails, how many hold, and the distance.
 
-    That is from the paper, the sum of the shortfalls and what is ``apart`` beyond them.
+    The distance, from the paper, is the sum of the shortfalls and of ``apart``, what differs besides.
     """
     counted = [shortfalls[name] for name in claims]
     holding = sum(short == 0.0 for short in counted)
@@ -119,7 +119,7 @@ def holds(row: Row, claim: str) -> bool:
 
 
 def share(rows: Sequence[Row], claim: str) -> float:
-    """Returns the share of interpretations under which a claim holds; NaN of none."""
+    """Returns the share of interpretations under which a claim holds; NaN if there are none."""
     return float(np.mean([holds(row, claim) for row in rows])) if rows else math.nan
 
 
@@ -135,7 +135,7 @@ def often(of: Interval) -> str:
 
 
 def percent(value: float) -> str:
-    """Returns a share in percent: never 0 or 100 for what is not none or all; a dash for NaN."""
+    """Returns a share in percent: 0 and 100 only for exactly none and all; a dash for NaN."""
     if math.isnan(value):
         return "–"
     if value in (0.0, 1.0):
@@ -146,7 +146,7 @@ def percent(value: float) -> str:
 
 
 class Option(NamedTuple):
-    """One option of a dimension, both by label, and the interpretations that took it."""
+    """One option of a dimension, both given by label, and the interpretations that took it."""
 
     dimension: str
     name: str
@@ -161,7 +161,7 @@ class Option(NamedTuple):
 
 
 def options(rows: Sequence[Row], space: InterpretationSpace) -> list[Option]:
-    """Returns all options that enough interpretations took: of the choices, and of the numbers thirds of ln range."""
+    """Returns all options that enough interpretations took; those of a number are thirds of its range in ln."""
     found = [
         Option(space.label(key), space.value(key, name), [row for row in rows if row[key] == name])
         for key, names in space.choices.items()
@@ -175,7 +175,7 @@ def options(rows: Sequence[Row], space: InterpretationSpace) -> list[Option]:
 
 
 class Decider(NamedTuple):
-    """The best and the worst option of the dimension on which a claim hangs most, with the shares of both."""
+    """The best and the worst option of the dimension on which a claim depends most, with the shares of both."""
 
     best: Option
     worst: Option
@@ -186,7 +186,7 @@ class Decider(NamedTuple):
 
 
 def decider(found: Sequence[Option], claim: str) -> Decider | None:
-    """Returns the options of the dimension whose shares differ most; None where no shares differ."""
+    """Returns the best and worst option of the dimension whose shares differ most; None if no shares differ."""
 
     def share_of(option: Option) -> float:
         return option.share(claim)

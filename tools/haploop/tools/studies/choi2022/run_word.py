@@ -1,7 +1,7 @@
-"""The largest stiffness that ``haploop run`` calls steady: what is left of it no hand feels.
+"""The largest stiffness that ``haploop run`` calls steady: no hand feels the swing that remains.
 
-The study itself asks, after the paper, for a swing of no more than one encoder step to either side (``steadiness``); of
-that a hand feels most. By the word of a run fewer and softer walls are steady.
+The study itself requires, like the paper, a swing of no more than one encoder step to either side (``steadiness``); a
+hand feels most of that. By the verdict of a run fewer and softer walls are steady.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from haploop.tools.studies.choi2022.answers import Answers
 from haploop.tools.studies.choi2022.device import Setup
 from haploop.tools.studies.choi2022.steadiness import CHOSEN_BY, JUDGED_BY, Presses, sizes_of
 
-# From 0.1 N/mm in steps of it.
+# From 0.1 N/mm in steps of 0.1 N/mm.
 RUN_STIFFNESSES = np.arange(1, 81) * 100.0
-# The sizes on a wall are judged in so many parts, for so many cores to share.
+# The sizes on a wall are judged in this many parts, so that as many cores share them.
 _PARTS = 4
 
 
 def steady_to_run(answers: Answers, setup: Setup, kind: str) -> Interval:
     """Returns the largest stiffness in N/mm up to which ``haploop run`` calls every wall steady, a mean over starts.
 
-    The size, chosen on other starts, is one of those that bear the most, the middle one of several.
+    The size, chosen on other starts, is the middle one of those that withstand the most.
     """
     sizes = sizes_of(kind, answers.small)[:: 3 if answers.small else 2].tolist()
     bears = _climbed(answers, setup, kind, sizes, CHOSEN_BY[:1] if answers.small else CHOSEN_BY).mean(axis=1)

@@ -1,4 +1,4 @@
-"""Runs behind the figures, in this process, and the frequencies in what they did."""
+"""Runs behind the figures, in this process, and the frequencies in their motion."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Run(NamedTuple):
 
 
 def run(scene: Scene) -> Run:
-    """Runs a scene; its verdict is the cheap one, of the last half second alone."""
+    """Runs a scene; its verdict is the cheap one, from the last half second alone."""
     memory = MemoryLog()
     summary = run_in_process(by_window(scene), registry(), memory=memory)
     return Run(scene, summary, memory.recording())
@@ -74,6 +74,6 @@ def strongest_Hz(log: Recording) -> float:
 
 
 def faster_m(log: Recording, frequency_Hz: float) -> float:
-    """Returns the root mean square of what of the position is faster than a frequency."""
+    """Returns the root mean square of the part of the position that is faster than a frequency."""
     frequencies, amplitudes = spectrum(log)
     return float(np.sqrt((amplitudes[frequencies > frequency_Hz] ** 2).sum() / 2.0))

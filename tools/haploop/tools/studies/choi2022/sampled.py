@@ -1,4 +1,4 @@
-"""The energy that a wall or an element takes out of prescribed samples: by the program's own controller, and in closed
+"""The energy that a wall or an element takes from prescribed samples: by the program's own controller, and in closed
 form.
 """
 
@@ -28,8 +28,8 @@ _TICKS = 4000
 def forces(x_m: np.ndarray, kind: str, cutoff_Hz: float | None = None) -> np.ndarray:
     """Returns the force of the wall's spring, or of an element that always acts, N, shape (ticks, batch) as ``x_m``.
 
-    Samples are 1 ms apart, numbers are the paper's; a spring's wall is above 0 and is never left. The cutoff is that of
-    a low-pass over the acceleration.
+    Samples are 1 ms apart, numbers are the paper's; the spring's wall is above 0 and is never left. The cutoff is that
+    of a low-pass over the acceleration.
     """
     element = ElementTable(name=kind, acts="always", parameters=_PARAMETERS.get(kind, {}))
     scene = Scene(
@@ -50,7 +50,7 @@ def forces(x_m: np.ndarray, kind: str, cutoff_Hz: float | None = None) -> np.nda
 def taken_J(x_m: np.ndarray, force_N: np.ndarray, late: int = 0) -> np.ndarray:
     """Returns the energy taken in each step, -f[k-1-late] (x[k] - x[k-1]) (Choi et al. 2022, eq. 4); shape of ``x_m``.
 
-    With prescribed samples it is the true book too, since the force is held from sample to sample.
+    With prescribed samples it is also the true energy, since the force is held from sample to sample.
     """
     acting = np.zeros_like(force_N)
     acting[1 + late :] = force_N[: len(force_N) - 1 - late]
@@ -65,19 +65,19 @@ def steps_J(v_m_s: np.ndarray, mass_kg: float) -> np.ndarray:
 
 
 def positions(v_m_s: np.ndarray) -> np.ndarray:
-    """Returns samples with these velocities as their backward differences, shape (velocities, ...), from 0 on."""
+    """Returns samples, from 0 on, whose backward differences are these velocities, shape (velocities, ...)."""
     return np.cumsum(v_m_s, axis=0) * PERIOD_S
 
 
 def closed_form(kind: str, theta: np.ndarray, late: int) -> np.ndarray:
-    """Returns the mean energy taken a sample under x[k] = A sin(k theta + phase), in units of A^2 (theta = omega T).
+    """Returns the mean energy taken per sample under x[k] = A sin(k theta + phase), in units of A^2 (theta = omega T).
 
         spring   (K / 2) (cos((d+1) theta) - cos(d theta))
         damping  (2 B / T) sin^2(theta / 2) cos((d+1) theta)
         inertia  (2 m / T^2) sin^2(theta / 2) (cos((d+1) theta) - cos((d+2) theta))
 
     The last from eq. 8: V = (2 A / T) sin(theta / 2) is the amplitude of v, and the mean of v[k] v[k-j] is
-    V^2 cos(j theta) / 2. So inertia takes while (2 d + 3) theta < 2 pi: below fs / (2 d + 3), 333 Hz without delay.
+    V^2 cos(j theta) / 2. Inertia takes energy while (2 d + 3) theta < 2 pi: below fs / (2 d + 3), 333 Hz without delay.
     """
     d, half = late, np.sin(theta / 2.0) ** 2
     match kind:
@@ -93,9 +93,9 @@ def closed_form(kind: str, theta: np.ndarray, late: int) -> np.ndarray:
 def mean_taken(
     kind: str, theta: np.ndarray, late: int, cutoff_Hz: float | None = None, ticks: int = _TICKS
 ) -> np.ndarray:
-    """Returns the mean energy taken a sample under a sine of A = 1 by running the program's controller.
+    """Returns the mean energy taken per sample under a sine of A = 1 by running the program's controller.
 
-    The mean is over the second half, with a Hann window, which makes little of where a swing is cut. At these
+    The mean is over the second half, with a Hann window, which reduces the effect of where a swing is cut. At the given
     frequencies the samples should not repeat soon, so that they meet all phases.
     """
     x = np.sin(np.arange(ticks)[:, None] * theta)
@@ -104,11 +104,11 @@ def mean_taken(
 
 
 def bidirectional_J(frequency_Hz: np.ndarray, age_s: float | None) -> np.ndarray:
-    """Returns the mean energy a sample that 1 kg takes from a sine of 1 m: |a| sin(theta / 2) sin(w (age + T / 2)).
+    """Returns the mean energy per sample that 1 kg takes from a sine of 1 m: |a| sin(theta / 2) sin(w (age + T / 2)).
 
     |a| = w^2, and f[k-1] = -|a| sin(w (t[k] - T - age)) times x[k] - x[k-1], which goes as cos(w (t[k] - T / 2)).
-    The older the reading, the more it takes: all of what is moved at a quarter of a swing. Without an age it is a
-    difference of differences: T old, and |a| = (2 / T)^2 sin^2(theta / 2).
+    The older the reading, the more it takes: all of what is moved at a quarter of a swing. Without an age the reading
+    is a difference of differences: T old, and |a| = (2 / T)^2 sin^2(theta / 2).
     """
     w = 2.0 * np.pi * np.asarray(frequency_Hz, float)
     half = np.sin(w * PERIOD_S / 2.0)
@@ -117,7 +117,7 @@ def bidirectional_J(frequency_Hz: np.ndarray, age_s: float | None) -> np.ndarray
 
 
 def returned(frequency_Hz: float, *, before: bool = True) -> float:
-    """Returns the energy that unidirectional inertia gives back to a sine over what it takes, 0 to 1.
+    """Returns the ratio of the energy that unidirectional inertia gives back to a sine to what it takes, 0 to 1.
 
     The gate is v[k] a[k-1] >= 0 if ``before``, as in eq. 9 (the program's controller), else v[k] a[k] >= 0.
     """

@@ -37,9 +37,9 @@ SPACE = InterpretationSpace.of_figure(6, seeded=True)
 BASE = SPACE.ours
 WHOLE = Effort(structures=64, each=64, rounds=4, best=3, children=64, finalists=3, neighbours=64)
 SMALL = Effort(structures=2, each=4, rounds=1, best=1, children=2, neighbours=2)
-# For each claim of V.A, in words, how it is tested; those aside are in no sum. How far it is from holding is 0.0 where
-# it holds, ln of the factor that is missing where it is a matter of a factor, 1 where it is one of yes or no, MOST
-# where the run diverged.
+# For each claim of V.A, in words, how it is tested; those aside are in no sum. The shortfall of a claim is 0.0 where it
+# holds, ln of the missing factor if the claim is about a factor, 1 if it is about yes or no, MOST where the run
+# diverged.
 CLAIMS: dict[str, str] = tables_of(6)["tested"]
 ASIDE: dict[str, str] = tables_of(6)["aside"]
 
@@ -47,11 +47,11 @@ _REACH_N = -0.6  # holds the hand's spring of 10 N/m at the wall, 60 mm away
 _STEP_AT_S = 0.1
 # "Any change resulted in the behavior becoming worse": these multiples of 0.8 N s/m stand for any change.
 OTHER_DAMPING = (0.5, 0.75, 4.0 / 3.0, 2.0)
-# (a) is run again for so many times as long: what still grows is no limit cycle.
+# (a) is run again for this many times as long: what still grows is no limit cycle.
 LONGER, GROWN = 3.0, 1.5
 # "Small": peak to peak, a tenth of the way to the wall. "Large", "considerably": by this factor.
 SMALL_M, MUCH = 6e-3, 2.0
-# A book that was never this share of its end below zero, or below its own peak, is passive, or monotone.
+# A book that never fell below zero, or below its own peak, by this share of its end is passive, or monotone.
 SLACK = 0.05
 
 
@@ -67,7 +67,7 @@ def used_numbers(chosen: Mapping[str, Any]) -> list[str]:
 
 
 def as_row(interpretation: Point) -> Row:
-    """Returns choices, numbers and seed in one flat map; numbers that do not matter under the choices are NaN."""
+    """Returns choices, numbers and seed in one flat map; numbers that the choices leave unused are NaN."""
     used = used_numbers(interpretation.choices)
     numbers = {key: value if key in used else math.nan for key, value in interpretation.numbers.items()}
     return {**interpretation.choices, **numbers, "seed": interpretation.seed}
@@ -108,7 +108,7 @@ def _force(kind: str, value: float, number: Mapping[str, float]) -> HandForce:
 
 
 def search(answers: Answers) -> Found:
-    """Searches for the nearest; stages are "base", "nearest" (numbers of three digits), and those of the search."""
+    """Searches for the nearest interpretation; stages are "base", "nearest" (three-digit numbers) and the search's."""
     found = searched(answers, SPACE, measure, SMALL if answers.small else WHOLE)
     nearest = found.best.point.rounded(3)
     ends = [*evaluated("base", measure, [[BASE]]), *evaluated("nearest", measure, [[nearest]])]
@@ -118,7 +118,7 @@ def search(answers: Answers) -> Found:
 def measure(interpretations: Sequence[Point]) -> list[Row]:
     """Returns a row for each interpretation: its ``as_row``, the swings in m, and by name the shortfall of each claim.
 
-    The interpretations are best of one structure, so that they run in one batch.
+    The interpretations should share one structure, so that they run in one batch.
     """
     variants = [_variants(interpretation) for interpretation in interpretations]
     names, count = list(variants[0]), len(interpretations)
@@ -162,12 +162,12 @@ class Extent(NamedTuple):
 
     @property
     def not_passive(self) -> float:
-        """1.0 unless it ends above 0 and was never below by more than the slack."""
+        """1.0 unless the book ends above 0 and was never below 0 by more than the slack."""
         return float(not (self.end > 0.0 and self.least >= -SLACK * self.end))
 
     @property
     def not_monotone(self) -> float:
-        """1.0 unless it ends above 0 and never fell by more than the slack."""
+        """1.0 unless the book ends above 0 and never fell by more than the slack."""
         return float(not (self.end > 0.0 and self.fall <= SLACK * self.end))
 
 
@@ -209,5 +209,5 @@ def _row(interpretation: Point, runs: dict[str, Summary], books: dict[str, Exten
 
 
 def over(value: float, most: float) -> float:
-    """Returns ln(value / most) where ``value`` is more than ``most``, else 0; MOST at most."""
+    """Returns ln(value / most) if ``value`` is more than ``most``, else 0; MOST at most."""
     return min(MOST, math.log(value / most)) if value > most > 0.0 else MOST if value > most else 0.0

@@ -1,12 +1,12 @@
 """Steady contacts, and the largest stiffness that an element steadies: one definition for the whole study.
 
-A contact is *steady* where, some time after a push, the position swings by no more than one encoder step to either side
+A contact is *steady* if, some time after a push, the position swings by no more than one encoder step to either side
 ("no unwanted vibration", Choi et al. 2022, V.B.3). An element's *largest steady stiffness* is the largest of 2.5, 3.0,
-... N/mm up to which every wall is steady with one and the same size of it.
+... N/mm up to which every wall is steady with one and the same size of the element.
 
-Sizes are tried by the cheap form of it (``is_steady``): the push is the tap that begins the press. They are tried in
-batches on a grid that begins with 0, then between the neighbours of the best; the best is the one with the greatest
-mean over a few starts of what it holds, of several the one that swings least. What is told as a result is judged
+Sizes are tried by the cheap form of this test (``is_steady``): the push is the tap that begins the press. They are
+tried in batches on a grid that begins with 0, then between the neighbours of the best; the best is the one that holds
+the most in the mean over a few starts, among equals the one that swings least. What is reported as a result is judged
 (``reached``), held still and pushed twice, from starts by which no size was chosen.
 """
 
@@ -29,32 +29,32 @@ from haploop.tools.studies.choi2022.answers import Answers
 from haploop.tools.studies.choi2022.device import KINDS, Setup, elements_of
 
 STEP_N_M = 500.0
-# From 2.5 N/mm in steps of 0.5 (Choi et al. 2022, V.B.3), to where nothing here is steady any more.
+# From 2.5 N/mm in steps of 0.5 (Choi et al. 2022, V.B.3), to where nothing is steady here.
 STIFFNESSES = np.arange(2500.0, 8001.0, STEP_N_M)
 # One encoder step to either side.
 WIDEST_M = 2.0 * 28.7e-6
-# A press is looked at over the half second before this time; the tap that begins it comes after some 10 ms.
+# A press is watched over the half second before this time; the tap that begins it comes after some 10 ms.
 WATCHED_S, BRIEFLY_S = 3.0, 1.5
-# Sizes of one element, N s/m or kg, and of both: dampings, then masses. Neighbours differ by some 10 and 25 per cent.
+# Sizes of one element, N s/m or kg, and of both: dampings, then masses. Neighbours differ by some 10 and 25 percent.
 DAMPINGS = np.append(0.0, np.geomspace(0.1, 10.0, 47))
 MASSES = np.append(0.0, np.geomspace(5e-4, 0.05, 47))
 PAIR_DAMPINGS = np.append(0.0, np.geomspace(0.4, 8.0, 13))
 PAIR_MASSES = np.append(0.0, np.geomspace(0.003, 0.045, 13))
 # Starts by which a size is chosen, and by which it is judged.
 CHOSEN_BY, JUDGED_BY = tuple(range(4)), tuple(range(100, 112))
-# Sizes tried between the neighbours of the best, of one element and of each of two.
+# Numbers of sizes tried between the neighbours of the best, for one element and for each of two.
 _FINER = {1: 16, 2: 6}
-# The walls are tried in so many parts, for so many cores to share; larger batches cost less.
+# The walls are tried in this many parts, so that as many cores share them; larger batches cost less.
 _PARTS = 4
-# With friction no two setups run in one batch, so that batches are small.
+# With friction no two setups run in one batch, so batches are small.
 _FEWEST = 4
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 
 
 def started(scene: Scene, start: int) -> Scene:
-    """Returns a scene with another start: seed of the sensors' noise, and where within a tick's way the wall is met.
+    """Returns a scene with another start: seed of the sensors' noise, and where in a tick's travel the wall is met.
 
-    Starts 0, 1, ... are spread evenly over the way of one tick by the golden ratio; start 0 is the scene's own.
+    Starts 0, 1, ... are spread evenly over the travel of one tick by the golden ratio; start 0 is the scene's own.
     """
     way_m = abs(scene.device.velocity) / scene.clock.control_rate
     device = replace(scene.device, position=scene.device.position + way_m * (start * _GOLDEN % 1.0))
@@ -67,7 +67,7 @@ def pressed(scene: Scene, until_s: float = WATCHED_S) -> Scene:
 
 
 def swing_m(result: Summary) -> float:
-    """Returns what the position swings by over the last half second, peak to peak; infinite where the run broke off."""
+    """Returns the swing of the position over the last half second, peak to peak; infinite if the run broke off."""
     return result["window"]["oscillation_m"] if "window" in result else np.inf
 
 
@@ -77,12 +77,12 @@ def is_steady(result: Summary) -> bool:
 
 
 def run_all(scenes: Sequence[Scene], *, energy: bool = False) -> list[Summary]:
-    """Returns the results of scenes, those of one structure in batches."""
+    """Returns the results of scenes; those of one structure run in batches."""
     return run_batch([*map(by_window, scenes)], registry(), energy=energy, fewest=_FEWEST)
 
 
 def largest(steady: np.ndarray, stiffnesses: np.ndarray = STIFFNESSES) -> float:
-    """Returns the largest stiffness that one size leaves steady, as it does all softer ones; N/m, 0 where none is.
+    """Returns the largest stiffness that one size leaves steady together with all softer ones; N/m, 0 if there is none.
 
     ``steady`` is of shape (stiffnesses, sizes).
     """
@@ -91,16 +91,16 @@ def largest(steady: np.ndarray, stiffnesses: np.ndarray = STIFFNESSES) -> float:
 
 
 def held(steady: np.ndarray) -> np.ndarray:
-    """Returns for every size (or whatever the further axes are) the stiffnesses before the first that is not steady."""
+    """Returns for every size (or along any further axes) how many stiffnesses precede the first that is not steady."""
     return np.logical_and.accumulate(steady, axis=0).sum(axis=0)
 
 
 class Range(NamedTuple):
-    """What was tried of one element.
+    """What was tried for one element.
 
     Attributes:
-        sizes: N s/m or kg, shape (sizes, 1), of damping with inertia (sizes, 2).
-        swings_m: of the position in the end, peak to peak, shape (stiffnesses, sizes, starts).
+        sizes: N s/m or kg, shape (sizes, 1), for damping with inertia (sizes, 2).
+        swings_m: swings of the position at the end, peak to peak, shape (stiffnesses, sizes, starts).
     """
 
     sizes: np.ndarray
@@ -116,23 +116,23 @@ class Range(NamedTuple):
         return held(self.swings_m <= widest_m).mean(axis=-1)
 
     def best(self) -> int:
-        """Returns the index of the best size; of several the one that swings least up to the stiffness it holds."""
+        """Returns the index of the best size; among equals the one that swings least up to the stiffness it holds."""
         most = self.held()
         there = np.flatnonzero(most == most.max())
         rungs = max(int(most.max()), 1)
         return int(there[self.swings_m[:rungs, there].max(axis=(0, 2)).argmin()])
 
     def with_more(self, other: Self) -> Self:
-        """Returns both, of the same starts, as one."""
+        """Returns this range and another of the same starts as one."""
         swings_m = np.concatenate([self.swings_m, other.swings_m], axis=1)
         return type(self)(np.concatenate([self.sizes, other.sizes]), swings_m)
 
 
 class Reached(NamedTuple):
-    """The largest steady stiffness of an element, N/m: with which size, and by the judge from each start.
+    """The largest steady stiffness of an element, N/m: the size, and for each start what the judge finds.
 
     Attributes:
-        twice: the largest, in the batches by which the size was chosen, if a swing might be twice as wide.
+        twice: the largest, in the batches by which the size was chosen, if a swing were allowed to be twice as wide.
     """
 
     kind: str
@@ -146,12 +146,12 @@ class Reached(NamedTuple):
         return mean_interval(np.array(self.steady) / 1e3)
 
     def describe(self) -> str:
-        """Returns it in N/mm: ``"4.96 [4.87, 5.05]"``, or ``"4.5"`` where all starts come to the same."""
+        """Returns the mean in N/mm: ``"4.96 [4.87, 5.05]"``, or ``"4.5"`` if all starts give the same."""
         return in_words(self.mean)
 
 
 def in_words(mean: Interval) -> str:
-    """Returns a mean with its interval, alone where all starts come to the same, and ``"none"`` for 0."""
+    """Returns a mean with its interval, without it if all starts give the same, and ``"none"`` for 0."""
     value, low, high = mean
     if not value:
         return "none"
@@ -159,7 +159,7 @@ def in_words(mean: Interval) -> str:
 
 
 def beats(one: Reached, other: Reached) -> bool:
-    """Tells whether one bears more than the other: by a step of the stiffness or more, their intervals apart."""
+    """Tells whether one withstands more than the other: by a step of the stiffness or more, with intervals apart."""
     return one.mean.value - other.mean.value >= 0.5 and one.mean.apart(other.mean)
 
 
@@ -188,15 +188,15 @@ class Presses(NamedTuple):
         return [started(scene, start) for scene in scenes for start in self.starts]
 
     def swings_m(self) -> np.ndarray:
-        """Returns how far the position swings in the end, shape (walls, sizes, starts)."""
+        """Returns how far the position swings at the end, shape (walls, sizes, starts)."""
         swings = [swing_m(result) for result in run_all([pressed(scene) for scene in self.scenes()])]
         return np.array(swings).reshape(len(self.walls), len(self.sizes), -1)
 
     def judged(self) -> list[float]:
         """Returns from each start the largest stiffness in N/m up to which all are steady with the first size.
 
-        By the judge of runs, which holds the hand, takes the noise away, pushes twice, and watches until it tells, for
-        up to 16 s.
+        This is found by the judge of runs, which holds the hand, removes the noise, pushes twice, and watches until it
+        can decide, for up to 16 s.
         """
         results = run_batch(self.scenes(), registry(), energy=False)
         counts = [rungs_held(map(is_judged_steady, results[at :: len(self.starts)])) for at in range(len(self.starts))]
@@ -204,9 +204,9 @@ class Presses(NamedTuple):
 
 
 def is_judged_steady(result: Summary) -> bool:
-    """Tells whether a run that was judged is steady: how wide what remains is, of what does not grow at the wall.
+    """Tells whether a run that was judged is steady: its swing does not grow at the wall, and what remains is narrow.
 
-    Where the judge cannot tell within 16 s whether a slow change goes on, that is how wide it was by then, unless it
+    If the judge cannot tell within 16 s whether a slow change continues, the width by then counts, unless the swing
     grew by more than three times the error of its rate.
     """
     found = result.get("stability", {"why": "", "width_m": np.inf})

@@ -1,8 +1,8 @@
 """Theory of a virtual inertia with the gate of eq. 9, and of linear elements, without a single run.
 
-At one frequency: the mass and the damping that the device feels of an inertia. In a contact: the largest stiffness that
-the loop bears with each element and its best size. Linear elements: where the one-tick map of the loop has the spectral
-radius 1. Unidirectional inertia: where the same map, switched by the gate, begins to grow.
+At one frequency: the mass and the damping that the device feels from an inertia. In a contact: the largest stiffness
+that the loop withstands with each element at its best size. For linear elements that is where the one-tick map of the
+loop has the spectral radius 1; for unidirectional inertia, where the same map, switched by the gate, begins to grow.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ FREQUENCIES_HZ = np.linspace(2.0, 498.0, 249)
 # Age of a reading of an MPU-9250 at its setting of 420 Hz.
 OLD_S = 1.38e-3
 DELAYS_S = np.linspace(0.0, 3e-3, 121)
-# Sizes tried first for every element: from next to nothing to beyond what any loop here bears. N s/m, and kg.
+# Sizes tried first for every element: from almost nothing to beyond what any loop here withstands. N s/m, and kg.
 DAMPINGS = np.geomspace(0.1, 40.0, 16)
 MASSES = np.geomspace(3e-4, 0.08, 16)
 _SOFTEST, _STIFFEST, _COARSE, _HALVINGS = 50.0, 60e3, 30, 4
-# Around so many of the best sizes, so many more on either side, so often.
+# Around this many of the best sizes, this many more on either side, this many times.
 _PEAKS, _FINER, _ZOOMS = 2, 2, 3
-# A mass that adds nothing but keeps its place in the map, and one to take the map's slope from; kg.
+# A mass that adds nothing but keeps its place in the map, and one that gives the slope of the map; kg.
 _NO_MASS, _SOME_MASS = 1e-15, 1e-3
 _STARTS, _TICKS, _SETTLED, _RESCALED_EVERY = 3, 1200, 400, 50
 
 
 def bidirectional(frequency_Hz: ArrayLike, *, reading_s: float, delay_s: ArrayLike) -> np.ndarray:
-    """Returns what f = -m a comes to for a device that swings at w: felt mass / m - j felt damping / (m w).
+    """Returns the effect of f = -m a on a device that swings at w: felt mass / m - j felt damping / (m w).
 
-    Late by psi = w (reading + delay + T / 2), age of the reading, extra delay and half a period of the hold, it is
-    felt as the mass m cos(psi) and the damping m w sin(psi): late inertia damps, most at a quarter of a period, and
-    drives from half a period on.
+    Late by psi = w (reading + delay + T / 2), from the age of the reading, the extra delay and half a period of the
+    hold, it is felt as the mass m cos(psi) and the damping m w sin(psi): late inertia damps, most at a quarter of a
+    period, and drives from half a period on.
     """
     w = 2.0 * np.pi * np.asarray(frequency_Hz, float)
     return np.exp(-1j * w * (reading_s + np.asarray(delay_s) + PERIOD_S / 2.0))
@@ -52,20 +52,20 @@ def bidirectional(frequency_Hz: ArrayLike, *, reading_s: float, delay_s: ArrayLi
 def unidirectional(
     frequency_Hz: ArrayLike, *, reading_s: float, delay_s: ArrayLike, velocity_s: ArrayLike = PERIOD_S / 2.0
 ) -> np.ndarray:
-    """Returns what f = -m a[k] while v[k] a[k-1] >= 0 (Choi et al. 2022, eq. 9) comes to, as a bidirectional one does.
+    """Returns the effect of f = -m a[k] while v[k] a[k-1] >= 0 (Choi et al. 2022, eq. 9), as ``bidirectional`` does.
 
     Against the reading a[k], the velocity (a difference, T / 2 old) lags by p = pi/2 + w (velocity - reading), a[k-1]
     by q = w T. With d = p - q folded into [0, pi] the gate is open around (p + q) / 2 for the share 1 - d / pi, and
         N = (2 h + e^(-j (p + q)) sin 2 h) / pi,    2 h = pi - d,
-    is what is left of the reading's fundamental, which then lags as that of a bidirectional inertia. Without any lag
+    is what is left of the reading's fundamental, which then lags like that of a bidirectional inertia. Without any lag
     d = pi/2 and N = 1/2 - j/pi: half the mass, and a damping of m w / pi. Where w (T/2 + reading) nears pi/2, v and
-    a[k-1] swing together and the gate never closes: there it is a bidirectional inertia. Beyond, it opens while
+    a[k-1] swing together and the gate never closes: there it is a bidirectional inertia. Beyond, the gate opens while
     the motion slows. The phase of the ticks is averaged over: no frequency is locked to the rate.
 
     Args:
         reading_s: age of the acceleration's reading.
         delay_s: extra delay of the loop.
-        velocity_s: age of the velocity; of one that is low-passed by frequency, ``low_passed_s``.
+        velocity_s: age of the velocity; for a low-passed one by frequency, see ``low_passed_s``.
     """
     w = 2.0 * np.pi * np.asarray(frequency_Hz, float)
     p, q = np.pi / 2.0 + w * (np.asarray(velocity_s) - reading_s), w * PERIOD_S
@@ -86,7 +86,7 @@ def always_open_Hz(*, reading_s: float) -> float:
 
 
 def damps(reading_s: float) -> np.ndarray:
-    """Returns which inertia damps, an index from 0 to 3 to the colours, shape (delays, frequencies)."""
+    """Returns which inertia damps, an index from 0 to 3 into the colours, shape (delays, frequencies)."""
     delay, frequency = np.meshgrid(DELAYS_S, FREQUENCIES_HZ, indexing="ij")
     two, one = (of(frequency, reading_s=reading_s, delay_s=delay) for of in (bidirectional, unidirectional))
     return (np.imag(two) < 0.0) + 2 * (np.imag(one) < 0.0)
@@ -103,14 +103,14 @@ def felt_damping(setup: Setup, frequency_Hz: np.ndarray) -> tuple[np.ndarray, np
 
 
 class Best(NamedTuple):
-    """The largest steady stiffness in N/m (0 where none is), and the element's size that bears it."""
+    """The largest steady stiffness in N/m (0 if there is none), and the size of the element that withstands it."""
 
     stiffness: float
     size: float
 
 
 def limits(setup: Setup) -> dict[str, Best]:
-    """Returns the limit of each of ``KINDS``: exact (rho(M) = 1) of three, by the gated map of the last."""
+    """Returns the limit of each of ``KINDS``: exact (rho(M) = 1) for the first three, by the gated map for the last."""
 
     def exact(kind: str, sizes: np.ndarray) -> np.ndarray:
         return np.array([first_end(setup, kind, size) for size in sizes])
@@ -126,7 +126,7 @@ def limits(setup: Setup) -> dict[str, Best]:
 
 
 def first_end(setup: Setup, kind: str, size: float) -> float:
-    """Returns the end of the range of steady stiffnesses that begins at 0, N/m; 0 where there is none."""
+    """Returns the end of the range of steady stiffnesses that begins at 0, N/m; 0 if there is none."""
     ranges = OneTickMap.from_scene(setup.linear_scene(elements_of(kind, float(size)))).stable_ranges()
     return min(ranges[0][1], _STIFFEST) if ranges and ranges[0][0] == 0.0 else 0.0
 
@@ -154,19 +154,19 @@ def gated_ends(gated: GatedMap, masses: np.ndarray) -> np.ndarray:
 
 
 def best_size(ends: Callable[[np.ndarray], np.ndarray], sizes: np.ndarray, nothing: float) -> Best:
-    """Returns the size that bears the most, 0 among them, searched between the neighbours of the best in rounds.
+    """Returns the size that withstands the most, possibly 0, searched between the neighbours of the best in rounds.
 
-    The steps between neighbours, in the logarithm, shrink threefold a round. Around two peaks of what was tried, since
-    what is borne may have several in the size.
+    The steps between neighbours, in the logarithm, shrink threefold a round. The search is around two peaks of what was
+    tried, since the limit may have several peaks over the size.
 
     Args:
-        ends: from sizes to the stiffnesses that they bear.
-        sizes: tried first, rising.
-        nothing: what is borne without the element.
+        ends: from sizes to the stiffnesses that they withstand.
+        sizes: sizes tried first, increasing.
+        nothing: the stiffness withstood without the element.
     """
     found = ends(sizes)
     for _ in range(_ZOOMS):
-        # Beyond the ends is nothing better.
+        # Nothing beyond the ends is better.
         around = np.concatenate([[-1.0], found, [-1.0]])
         peaks = np.flatnonzero((found >= around[:-2]) & (found >= around[2:]))
         peaks = peaks[np.argsort(found[peaks])][-_PEAKS:]
@@ -186,7 +186,7 @@ class GatedMap:
 
     The one-tick map of a linear loop in a contact that is never left (``OneTickMap``), switched by the signs of
     v[k] = x[k] - x[k-1] and of the reading before the present one. It is homogeneous, so that a start either grows or
-    decays, whatever its size; the fastest growth of a few random ones counts.
+    decays, whatever its size; the fastest growth of a few random starts counts.
 
     Attributes:
         without: A, shape (w, w).
@@ -205,8 +205,8 @@ class GatedMap:
         """Makes the map of a resolved scene without elements.
 
         Raises:
-            ValueError: velocity or acceleration are not read as the map has it.
-            NotLinear: the rest of the loop is no linear map.
+            ValueError: velocity or acceleration are not read as the map assumes.
+            NotLinear: the rest of the loop is not a linear map.
         """
         if scene.velocity or scene.acceleration != Acceleration(source="accelerometer"):
             raise ValueError("The gate's map is that of a plain difference of positions and a raw accelerometer.")
@@ -220,14 +220,14 @@ class GatedMap:
         return cls(least.without_wall, per_kg, least.pushed, len(Chain.from_scene(scene).states))
 
     def growth(self, stiffness: ArrayLike, mass: ArrayLike) -> np.ndarray:
-        """Returns ln of the factor per tick by which the fastest of some random starts grows in the end, peak to peak.
+        """Returns ln of the factor per tick by which the fastest of some random starts finally grows, peak to peak.
 
         Stiffness in N/m and mass in kg are broadcast to one shape.
         """
         k, m = np.broadcast_arrays(np.asarray(stiffness, float), np.asarray(mass, float))
         shape = (_STARTS, *k.shape)
         k, m = np.tile(k.ravel(), _STARTS), np.tile(m.ravel(), _STARTS)
-        # 1 m/s for every velocity and 1 mm for every length; what else is a state counts as a velocity.
+        # 1 m/s for every velocity and 1 mm for every length; any other state counts as a velocity.
         units = np.where(np.arange(self.states) < self.states // 2, 1e-3, 1.0)[:, None]
         w = np.zeros((len(self.without), len(k)))
         w[: self.states] = np.random.default_rng(1).normal(size=(self.states, len(k))) * units
