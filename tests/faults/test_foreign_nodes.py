@@ -203,7 +203,7 @@ def test_a_foreign_plant_whose_sample_is_no_number_ends_the_run_by_name(
     run = started("--node", f"plant={shlex.join([sys.executable, str(script)])}", node=None)
     run.end(1)
     assert "The plant's sample of tick 300 must be a list of 1 finite number, but [" in run.stderr
-    assert "not haploop's own" in run.stderr
+    assert "Not haploop's own in this run: the plant (" in run.stderr
     assert json.loads((run.out_directory / "summary.json").read_text())["ended"] == "failed"
 
 

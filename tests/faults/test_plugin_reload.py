@@ -44,7 +44,7 @@ def test_a_reload_that_breaks_in_any_way_changes_nothing_and_time_goes_on(runnin
     with pytest.raises(run_directory.CommandRefused, match="NameError: name 'Quanity'"):
         run.ask("swap", **SWAP, reload=True)
     plugin.write_text(source() + source().replace('"brake"', '"damping"').replace("class Brake", "class Damping"))
-    with pytest.raises(run_directory.CommandRefused, match="defines damping now, a kind that the run has from els"):
+    with pytest.raises(run_directory.CommandRefused, match="now defines damping, a kind that the run has from another"):
         run.ask("swap", **SWAP, reload=True)
     assert sorted((run.out / "plugins").iterdir()) == kept
     assert run.ask("options")["kinds"] == options["kinds"]

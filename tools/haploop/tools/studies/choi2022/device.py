@@ -1,4 +1,4 @@
-"""A PHANToM Premium 1.5 in a hand that taps and presses a wall; everything that was not published is a free number.
+"""A PHANToM Premium 1.5 in a hand that taps and presses a wall; everything that was not published is a value to choose.
 
 Its nearest interpretation is a scene file: launch/scenes/premium_press.toml.
 """
