@@ -177,7 +177,7 @@ def test_the_first_scene_does_what_its_tutorial_says(reader: Reader) -> None:
     assert "does every bit agree?" in text
     assert said["replay runs/..."].startswith("Every bit of ")
     assert "one count of the encoder comes to" in text
-    assert "one count" in said["explain my.toml"]
+    assert "effect of one encoder count" in said["explain my.toml"]
     assert said["plot runs/..."].splitlines()[-1].endswith("figure.png")
 
 

@@ -30,8 +30,8 @@ def test_where_only_extremes_are_kept_no_wall_is_denied_and_no_line_swings_betwe
         snapshot(0.0, 2.0, table("position", 0.025, 0.05, ("x", "m", "position", rows), envelope=True), coarse=True)
     )
     expect(page.locator("#position .note")).to_have_text("only ranges of 100 ms kept")
-    expect(page.locator("#loop .absent")).to_contain_text("least and greatest of each interval")
-    expect(page.locator("#momentum .absent")).to_contain_text("least and greatest of each interval")
+    expect(page.locator("#loop .absent")).to_contain_text("minimum and maximum of each interval")
+    expect(page.locator("#momentum .absent")).to_contain_text("minimum and maximum of each interval")
     middle = seen(page, "position", [0.0125 + 0.05 * i for i in range(1, 19)], "ink")
     assert all(edges and edges[1] - edges[0] > 0.8 for edges in middle), "from the least to the greatest all along"
     page.click("[data-panel=spectrum]")

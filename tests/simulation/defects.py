@@ -82,7 +82,7 @@ def _unchecked_answer(kept: Method) -> Method:
             sender, data = self._receive()
         answer = msgpack.unpackb(data)
         if answer[:3] != [VERSION, MESSAGES["COMMANDS"].code, tick] or len(answer[3]) != len(samples):
-            raise LoopError("In the loop other commands were expected.")
+            raise LoopError("In the loop, other commands were expected.")
         return answer[3]
 
     return exchange

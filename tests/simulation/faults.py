@@ -207,7 +207,7 @@ class Garble(Fault):
 
     @property
     def excuse(self) -> str:
-        return "The (plant|controller) failed: (In the loop|The plant's greeting) "
+        return "The (plant|controller) failed: (In the loop,|The plant's greeting) "
 
     def happen(self, sim: Sim) -> None:
         partner = sim.run.nodes["controller"]
