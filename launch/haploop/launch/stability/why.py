@@ -52,7 +52,7 @@ DEEPER = {
 FRICTIONLESS = {
     "rests": " Held like this, it would also rest without its friction.",
     "swings on": " Only friction holds it: without it, its swing would last or grow.",
-    "swings on a part of a count deeper": " Only friction holds it: without it, its swing would last or grow a part of "
-    "an encoder's count deeper.",
+    "swings on a part of a count deeper": " Only friction holds it: without it, and held a part of an encoder's count "
+    "deeper, its swing would last or grow.",
     "undecided": " Whether it would rest without its friction could not be determined.",
 }
