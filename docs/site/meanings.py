@@ -16,7 +16,10 @@ from haploop.plant.counters import COUNTERS
 
 # What a finding has that no summary holds under this name.
 _NOT_TOLD = ("word", "detail")
-_WITHOUT = "what the loop does without this part, or with an encoder 1000 times as fine: rests, swings on, or undecided"
+_WITHOUT = (
+    "what the loop does without this part, or with an encoder 1000 times as fine: rests, swings less (than a third as "
+    "wide), swings otherwise (at another frequency), swings on, or undecided"
+)
 
 
 def attributes(kind: type) -> dict[str, str]:

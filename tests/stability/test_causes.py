@@ -48,7 +48,7 @@ def afresh(scene: Scene, part: str) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("stiffness", "does"), [(2500.0, "rests"), (30000.0, "swings on")])
+@pytest.mark.parametrize(("stiffness", "does"), [(2500.0, "rests"), (30000.0, "swings")])
 def test_without_delay_a_swing_ends_where_the_wall_is_below_the_limit_of_a_loop_without_delay_alone(
     stiffness: float, does: str
 ) -> None:
@@ -62,14 +62,14 @@ def test_without_delay_a_swing_ends_where_the_wall_is_below_the_limit_of_a_loop_
     assert (direct.growth(stiffness) < 1.0) == (does == "rests")
     found = tried(scene)
     assert found
-    assert found["delay"] == does
+    assert found["delay"].split()[0] == does
 
 
 @pytest.mark.slow
 def test_a_swing_that_counts_alone_set_off_is_laid_to_the_encoder_though_the_books_name_the_delay() -> None:
     """The counter-example to the books: a wall far below its limit behind coarse counts."""
     found = tried(demo("wall.stiffness=800", "encoder.resolution=2e-4"))
-    assert found == {"delay": "swings on", "encoder": "rests"}
+    assert found == {"delay": "swings less", "encoder": "rests"}
     assert by_trial(found).startswith("the encoder's counts. ")
 
 
@@ -79,6 +79,25 @@ def test_damping_beyond_what_the_delay_allows_is_named_and_the_wall_without_it_r
     found = tried(scene)
     assert found == {"delay": "rests", "encoder": "swings on", "elements": "rests"}
     assert judge_scene(replace(scene, dissipation=()), registry()).word == "steady"
+
+
+@pytest.mark.slow
+def test_what_the_delay_makes_most_of_and_what_swings_at_another_frequency_is_not_said_to_swing_on() -> None:
+    """Counter-examples of a review: 2.6 mm that become 17 µm, and damping far too large beside a stiff wall."""
+    mostly = tried(load("demo", ["event=[]", "wall.stiffness=10000", "clock.round_trip_delay=0.001"]))
+    assert mostly == {"delay": "swings less", "encoder": "swings on"}
+    assert by_trial(mostly).startswith("mostly the delay. ")
+    other = tried(load("demo", ["event=[]", "dissipation=[{kind='damping', damping=60}]"]))
+    assert other
+    assert other["elements"] == "swings otherwise"
+
+
+@pytest.mark.slow
+def test_of_a_line_with_jitter_the_delay_is_neither_named_nor_cleared() -> None:
+    jitter = "jitter={kind='gamma', mean=0.003, deviation=0.001}"
+    found = tried(load("demo", ["event=[]", "wall.stiffness=1500", "clock.round_trip_delay=0.0003", jitter]))
+    assert found == {"encoder": "swings on"}
+    assert by_trial(found).startswith("not found by these trials; ")
 
 
 @pytest.mark.slow
@@ -96,6 +115,6 @@ def test_nine_trials_in_ten_have_the_word_of_a_scene_that_never_had_the_part() -
         assert scene
         for part, does in (judge_scene(scene, registry(), None, LOOKS_S, causes=True).without or {}).items():
             word = WORDS.get(afresh(scene, part), "undecided")
-            alike += [does == word] if "undecided" not in (does, word) else []
+            alike += [does.split()[0] == word.split()[0]] if "undecided" not in (does, word) else []
     assert len(alike) >= 10
     assert 0.9 * len(alike) <= sum(alike) < len(alike)

@@ -72,8 +72,8 @@ class Finding:
             last one, or if the hand does not move.
         at_hardest: what it does there: rests, swings on, or undecided; None if not asked.
         without: for a loop that swings, what it does without its ``delay``, with a much finer ``encoder``, without its
-            ``elements``, and without ``all`` of these if it swings on without any one of them: rests, swings on, or
-            undecided; None if not asked.
+            ``elements``, and without ``all`` of these if it swings without any one of them: rests, swings less (than a
+            third as wide), swings otherwise (at another frequency), swings on, or undecided; None if not asked.
         settles_s: how long after the push it came within 5 % of where it rests; None if it does not.
         memory_drifts: whether the memory of an element still changes while the loop rests.
     """

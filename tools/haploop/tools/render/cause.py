@@ -32,11 +32,24 @@ _PARTS = {
     "elements": ("the dissipation elements", "without its elements"),
     "all": ("", "without all of these"),
 }
-_DOES = {"rests": "rests {}", "swings on": "swings on {}", "undecided": "is undecided {}"}
-_SEVERAL = "{} together, since it rests without any one of them"
-_NO_SINGLE_ONE = "no single part, since it swings on without any one of them"
-_THE_REST = "the hold of each force over a tick, or something else that the scene simulates"
+_DOES = {
+    "rests": "rests {}",
+    "swings less": "swings less than a third as wide {}",
+    "swings otherwise": "swings at another frequency {}",
+    "swings on": "swings on {}",
+    "undecided": "is undecided {}",
+}
+_SEVERAL = "{} together: taking out any one of them is enough"
+_MOSTLY = "mostly {}"
+_NO_SINGLE_ONE = "no single part, since it swings without any one of them"
+_NOT_FOUND = (
+    "not found by these trials; the hold of each force over a tick, jitter, a cable, the actuator, the wall's own "
+    "damping and its stiffness were not tried"
+)
 _UNTOLD = "not determined by these trials"
+# Below this share most of what is seen is the hand's motion, noise, or dies away.
+_HALF = 0.5
+_SMALL_SHARE = "of the {:.0%} of the oscillation that the loop sustains alone, "
 _TRIED = "{cause}. Continued from the end of the run, the loop {trials}."
 _BY_BOOKS = "According to the books of the whole run"
 # The books of wall and elements are those of the commands, and the actuator has one of its own.
@@ -51,7 +64,11 @@ def likely_cause(summary: Summary) -> str:
     Where the loop was tried without its parts, it is the part without which it rests, followed by the trials. The
     energy by the books, ``cause``, comes after it: one part may feed a swing that rests without another.
     """
-    tried = by_trial(summary.get("stability", {}).get("without"))
+    stability = summary.get("stability", {})
+    tried = by_trial(stability.get("without"))
+    share = stability.get("own_share")
+    if tried and share is not None and share < _HALF:
+        tried = _SMALL_SHARE.format(share) + tried
     books = cause(summary["energy"], _BY_BOOKS) if tried else cause(summary["energy"])
     return f"{tried} {books}".strip()
 
@@ -66,12 +83,12 @@ def by_trial(without: Mapping[str, str] | None) -> str:
 
 
 def _cause_by_trial(without: Mapping[str, str]) -> str:
-    if rests := [_PARTS[name][0] for name, does in without.items() if does == "rests" and name != "all"]:
-        parts = " and ".join(rests)
-        return _SEVERAL.format(parts) if len(rests) > 1 else parts
+    for does, words in (("rests", "{}"), ("swings less", _MOSTLY)):
+        if parts := [_PARTS[name][0] for name, did in without.items() if did == does and name != "all"]:
+            return (_SEVERAL if does == "rests" and len(parts) > 1 else words).format(" and ".join(parts))
     if "undecided" in without.values():
         return _UNTOLD
-    return _NO_SINGLE_ONE if without.get("all") == "rests" else _THE_REST
+    return _NO_SINGLE_ONE if without.get("all") in ("rests", "swings less") else _NOT_FOUND
 
 
 def cause(energy: Summary, when: str = "In all") -> str:
