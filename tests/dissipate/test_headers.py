@@ -1,4 +1,4 @@
-"""What stands above the numbers of a text recording: a title, a header, a row of units."""
+"""Lines above the numbers of a text recording: a title, a header, a row of units."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the page keeps of before and after a change, also where it did not receive all of it."""
+"""The sides of a change, before and after it, as the page keeps them, also where it did not receive all of it."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,1 +1,1 @@
-"""What all processes share: scene, changes, simulated time, numbers and trees; ``transport`` connects them."""
+"""Common ground of all processes: scene, changes, simulated time, numbers and trees; ``transport`` connects them."""

@@ -1,4 +1,4 @@
-"""What a page sees of a motion that it received."""
+"""Measures of a motion as a page that received it computes them."""
 
 import numpy as np
 
