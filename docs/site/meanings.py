@@ -17,8 +17,8 @@ from haploop.plant.counters import COUNTERS
 # What a finding has that no summary holds under this name.
 _NOT_TOLD = ("word", "detail")
 _WITHOUT = (
-    "what the loop does without this part, or with an encoder 1000 times as fine: rests, swings less (than a third as "
-    "wide), swings otherwise (at another frequency), swings on, or undecided"
+    "what the loop does without this part: rests, swings less (than a third as wide), swings otherwise (at another "
+    "frequency), swings on, or undecided"
 )
 
 
@@ -54,7 +54,7 @@ def pattern(key: str) -> str:
     """Returns a dotted key of a summary with N for every place in a list and NAME for every name of the scene's."""
     key = re.sub(r"(?<=\.)\d+(?=\.|$)", "N", key)
     return re.sub(
-        r"(?<=\.parameters\.)\w+|(?<=^versions\.)\w+|(?<=^programs\.)\w+|(?<=^stability\.without\.)\w+", "NAME", key
+        r"(?<=\.parameters\.)\w+|(?<=^versions\.)\w+|(?<=^programs\.)\w+|(?<=^stability\.without\.).+", "NAME", key
     )
 
 

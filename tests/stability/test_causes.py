@@ -1,16 +1,17 @@
-"""Causes of a swing by trial: the loop continued without its delay, encoder counts or elements."""
+"""Causes of a swing by trial: the loop started anew without each of its parts."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
 from haploop.controller.dissipation import registry
+from haploop.launch.plan.idealised import DELAY, HOLD, faster, idealised, uncontrolled
+from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from haploop.launch.stability.causes import FINER, with_causes
+from haploop.launch.stability.causes import with_causes
 from haploop.launch.stability.judge import judge, judge_scene
 from haploop.launch.stability.looks import LOOKS_S
 from haploop.protocol.scene.scene import Scene
@@ -20,9 +21,8 @@ from helpers.runs.judged import ended
 from helpers.scenes.wild_loops import drawn
 
 BARE = ["event=[]", "friction.kinetic=0", "dissipation=[]", "duration=0.8"]
-
-
-WORDS = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on"}
+ANY_FORCE = ["actuator.saturation=1e6", "encoder.resolution=1e-9"]
+WORDS = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on", "diverged": "swings on"}
 
 
 def demo(*sets: str) -> Scene:
@@ -30,21 +30,21 @@ def demo(*sets: str) -> Scene:
     return load("demo", [*BARE, *sets])
 
 
-def tried(scene: Scene) -> Mapping[str, str] | None:
+def tried(scene: Scene) -> Mapping[str, str]:
+    """What the scene's loop does without its parts; nothing for one that was not tried."""
     end = ended(scene)
-    return with_causes(end, judge(end, LOOKS_S)).without
+    return with_causes(end, judge(end, LOOKS_S)).without or {}
 
 
-def afresh(scene: Scene, part: str) -> str:
-    """The word for a scene that never had a part, run from its own beginning."""
-    encoder = scene.encoder and replace(scene.encoder, resolution=scene.encoder.resolution / FINER)
-    without: dict[str, dict[str, Any]] = {
-        "delay": {"clock": replace(scene.clock, round_trip_delay=0.0)},
-        "encoder": {"encoder": encoder},
-        "elements": {"dissipation": ()},
-    }
-    parts = without.values() if part == "all" else [without[part]]
-    return judge_scene(replace(scene, **{key: value for each in parts for key, value in each.items()}), registry()).word
+def growth(scene: Scene) -> float:
+    """The spectral radius of the one-tick map of a loop without friction and counts."""
+    smooth = replace(scene, friction=None, encoder=None, actuator=None)
+    return OneTickMap.from_scene(smooth, registry()).growth(value_of(smooth))
+
+
+def value_of(scene: Scene) -> float:
+    assert scene.wall
+    return scene.wall.stiffness
 
 
 @pytest.mark.slow
@@ -53,68 +53,114 @@ def test_without_delay_a_swing_ends_where_the_wall_is_below_the_limit_of_a_loop_
     stiffness: float, does: str
 ) -> None:
     """The limit is the stiffness at which the spectral radius of the one-tick map is 1."""
-    scene = replace(demo(f"wall.stiffness={stiffness}", "encoder.resolution=1e-9"), friction=None)
-    late, direct = (
-        OneTickMap.from_scene(replace(scene, clock=replace(scene.clock, round_trip_delay=delay)), registry())
-        for delay in (scene.clock.round_trip_delay, 0.0)
-    )
-    assert late.growth(stiffness) > 1.0
-    assert (direct.growth(stiffness) < 1.0) == (does == "rests")
-    found = tried(scene)
-    assert found
-    assert found["delay"].split()[0] == does
+    scene = demo(f"wall.stiffness={stiffness}", *ANY_FORCE)
+    assert growth(scene) > 1.0
+    assert (growth(idealised(scene)[DELAY]) < 1.0) == (does == "rests")
+    assert tried(scene)[DELAY].split()[0] == does
 
 
 @pytest.mark.slow
-def test_a_swing_that_counts_alone_set_off_is_laid_to_the_encoder_though_the_books_name_the_delay() -> None:
+def test_a_wall_beyond_the_limit_of_its_control_rate_alone_is_laid_to_sampling_and_hold() -> None:
+    """No delay, no counts to speak of: b > K T / 2 fails at 1 kHz and holds at 10 kHz (Colgate and Schenkel 1997)."""
+    scene = demo("wall.stiffness=20000", "clock.round_trip_delay=0", *ANY_FORCE)
+    quick = faster(scene)
+    assert quick
+    assert quick.clock.control_rate == 10 * scene.clock.control_rate
+    assert growth(scene) > 1.0 > growth(quick)
+    found = tried(scene)
+    assert found[HOLD] == "rests"
+    assert set(found.values()) == {"rests", "swings on"}
+    assert by_trial(found).startswith("sampling and hold. ")
+
+
+@pytest.mark.slow
+def test_a_cable_that_swings_against_a_stiff_wall_is_laid_to_the_structural_mode() -> None:
+    cable = "transmission={motor_mass=0.01, motor_damping=0.5, stiffness=3000, damping=0.05}"
+    scene = demo("wall.stiffness=2000", "clock.round_trip_delay=0", cable, *ANY_FORCE)
+    assert growth(scene) > 1.0 > growth(idealised(scene)["structural mode"])
+    assert tried(scene)["structural mode"] == "rests"
+
+
+@pytest.mark.slow
+def test_a_swing_that_counts_alone_set_off_is_laid_to_quantisation_though_the_books_name_the_delay() -> None:
     """The counter-example to the books: a wall far below its limit behind coarse counts."""
     found = tried(demo("wall.stiffness=800", "encoder.resolution=2e-4"))
-    assert found == {"delay": "swings less", "encoder": "rests"}
-    assert by_trial(found).startswith("the encoder's counts. ")
+    assert found == {DELAY: "swings less", "actuator limits": "swings on", "quantisation": "rests"}
+    assert by_trial(found).startswith("quantisation. ")
 
 
 @pytest.mark.slow
 def test_damping_beyond_what_the_delay_allows_is_named_and_the_wall_without_it_rests() -> None:
     scene = load("demo", ["event=[]", "wall.stiffness=1000", "dissipation=[{kind='damping', damping=40}]"])
     found = tried(scene)
-    assert found == {"delay": "rests", "encoder": "swings on", "elements": "rests"}
+    assert {name for name, does in found.items() if does == "rests"} == {DELAY, "element 0 (damping)"}
     assert judge_scene(replace(scene, dissipation=()), registry()).word == "steady"
 
 
 @pytest.mark.slow
-def test_what_the_delay_makes_most_of_and_what_swings_at_another_frequency_is_not_said_to_swing_on() -> None:
-    """Counter-examples of a review: 2.6 mm that become 17 µm, and damping far too large beside a stiff wall."""
-    mostly = tried(load("demo", ["event=[]", "wall.stiffness=10000", "clock.round_trip_delay=0.001"]))
-    assert mostly == {"delay": "swings less", "encoder": "swings on"}
-    assert by_trial(mostly).startswith("mostly the delay. ")
-    other = tried(load("demo", ["event=[]", "dissipation=[{kind='damping', damping=60}]"]))
-    assert other
-    assert other["elements"] == "swings otherwise"
+def test_of_two_elements_the_one_that_is_too_strong_is_named_alone() -> None:
+    elements = "dissipation=[{kind='damping', damping=0.5}, {kind='damping', damping=40}]"
+    found = tried(load("demo", ["event=[]", "wall.stiffness=1000", elements]))
+    assert (found["element 0 (damping)"], found["element 1 (damping)"]) == ("swings on", "rests")
 
 
 @pytest.mark.slow
-def test_of_a_line_with_jitter_the_delay_is_neither_named_nor_cleared() -> None:
+def test_damping_of_the_wall_itself_beyond_what_its_sampling_allows_is_named() -> None:
+    scene = load("demo", ["event=[]", "wall.kind='kelvin-voigt'", "clock.round_trip_delay=0", "wall.damping=60"])
+    assert tried(scene)["wall damping"] == "rests"
+    assert judge_scene(uncontrolled(scene)["wall damping"], registry()).word == "steady"
+
+
+@pytest.mark.slow
+def test_what_the_delay_makes_most_of_and_what_swings_at_another_frequency_is_not_said_to_swing_on() -> None:
+    """2.6 mm that become 17 µm, and damping far too large beside a stiff wall."""
+    mostly = tried(load("demo", ["event=[]", "wall.stiffness=10000", "clock.round_trip_delay=0.001"]))
+    assert mostly[DELAY] == "swings less"
+    assert by_trial(mostly).startswith("mostly round-trip delay. ")
+    other = tried(load("demo", ["event=[]", "dissipation=[{kind='damping', damping=60}]"]))
+    assert other["element 0 (damping)"] == "swings otherwise"
+
+
+@pytest.mark.slow
+def test_the_jitter_of_a_line_is_a_part_of_its_own() -> None:
     jitter = "jitter={kind='gamma', mean=0.003, deviation=0.001}"
     found = tried(load("demo", ["event=[]", "wall.stiffness=1500", "clock.round_trip_delay=0.0003", jitter]))
-    assert found == {"encoder": "swings on"}
-    assert by_trial(found).startswith("not found by these trials; ")
+    assert found["jitter and loss"] == "rests"
 
 
 @pytest.mark.slow
-def test_what_rests_is_not_tried() -> None:
-    assert tried(demo("wall.stiffness=100")) is None
+def test_the_parts_are_those_at_work_at_the_end_of_the_run() -> None:
+    swap = "event=[{at=0.3, swap={kind='damping', damping=40}}, {at=0.4, set={'clock.round_trip_delay'=0.004}}]"
+    found = tried(load("demo", ["wall.stiffness=1000", "dissipation=[]", "clock.round_trip_delay=0", swap]))
+    assert {DELAY, "element 0 (damping)"} <= {name for name, does in found.items() if does == "rests"}
+
+
+@pytest.mark.slow
+def test_of_a_run_that_diverged_the_cause_is_told_too() -> None:
+    scene = demo("wall.stiffness=3000", "clock.round_trip_delay=0.02", "diverged_beyond=0.03", *ANY_FORCE)
+    summary = run_in_process(scene, registry(), causes=True)
+    assert summary["verdict"] == "diverged"
+    assert summary["stability"]["without"][DELAY] == "rests"
+    assert run_in_process(scene, registry())["stability"]["without"] is None
+
+
+@pytest.mark.slow
+def test_what_rests_or_has_no_wall_is_not_tried() -> None:
+    assert not tried(demo("wall.stiffness=100"))
 
 
 @pytest.mark.slow
 def test_nine_trials_in_ten_have_the_word_of_a_scene_that_never_had_the_part() -> None:
     """Of drawn loops that swing. Some have two states, and which one they come to depends on where they start."""
-    seeds = (41039, 41126, 41221, 41249, 41272, 41345, 41382)
+    seeds = (41023, 41063, 41067, 41126, 41128, 41148, 41197)
     alike = list[bool]()
     for seed in seeds:
         scene = drawn(seed)
         assert scene
-        for part, does in (judge_scene(scene, registry(), None, LOOKS_S, causes=True).without or {}).items():
-            word = WORDS.get(afresh(scene, part), "undecided")
+        found = judge_scene(scene, registry(), None, LOOKS_S, causes=True).without or {}
+        for part, without in (idealised(scene) | uncontrolled(scene)).items():
+            word = WORDS.get(judge_scene(without, registry()).word, "undecided")
+            does = found[part]
             alike += [does.split()[0] == word.split()[0]] if "undecided" not in (does, word) else []
-    assert len(alike) >= 10
-    assert 0.9 * len(alike) <= sum(alike) < len(alike)
+    assert len(alike) >= 15
+    assert 0.85 * len(alike) <= sum(alike) < len(alike)

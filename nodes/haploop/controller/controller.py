@@ -94,6 +94,14 @@ class Controller:
         self._changes = tree_select(self._changes, kept)
         self.recorder.open(self.params)
 
+    @property
+    def kinds(self) -> Kinds:
+        """Returns the kinds of elements that it knows, with the code that swaps have brought."""
+        return self._with(self._reloaded)
+
+    def _with(self, reloaded: Sequence[tuple[int, str | None, Kinds]]) -> Kinds:
+        return dict(ChainMap(*(code for *_, code in reversed(reloaded)), self._kinds))
+
     def learn(self, kinds: Kinds) -> None:
         """Adds kinds that a coming swap names; those of plugins stay unchanged."""
         self._kinds = kinds | self._kinds
@@ -148,8 +156,7 @@ class Controller:
             params = self.params
             try:
                 reloaded = (*self._reloaded, (change.tick, change.plugin, code_of(change)))
-                kinds = dict(ChainMap(*(code for *_, code in reversed(reloaded)), self._kinds))
-                params, after = apply_change(change, self.params, state, kinds)
+                params, after = apply_change(change, self.params, state, self._with(reloaded))
                 if change.swap is not None and change.swap.name != NO_ELEMENT:
                     try_element(change.element, params, after, sample)
             except NoForce as error:

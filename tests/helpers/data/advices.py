@@ -32,6 +32,6 @@ ADVICE = Advice(
     found=FOUND, formulas=(NONE_KNOWN, replace(NONE_KNOWN, stiffness_N_m=math.inf)),
     published=(Published(800.0, "a maker", ""),),
     unchanged=changed("unchanged", 2900.0, 2100.0), changed=(changed("ticks twice as often", 5800.0, 2310.0),),
-    without=(changed("no friction", 127.0, 127.0), changed("no actuator", 2750.0, 2100.0)), assumed=(),
+    without=(changed("no friction", 127.0, 127.0), changed("no actuator limits", 2750.0, 2100.0)), assumed=(),
     own=None, scene=None, breaks=None, runs=1,
 )  # fmt: skip

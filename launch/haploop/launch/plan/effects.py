@@ -107,7 +107,7 @@ def _goes_by_whole_steps(scene: Scene) -> bool:
 
 
 _LINE_COUNTS = ("lost.commands_dropped", "lost.commands_lost")
-_LIMITED = {"actuator": rules.left_out("actuator")}
+_LIMITED = {"actuator limits": rules.left_out("actuator")}
 _OF_ACCELEROMETER = _plant("sensing.accelerometer", *NOISY, *COUNTED)
 
 # In the order in which they act within their stage.
@@ -123,7 +123,7 @@ EFFECTS: tuple[Effect, ...] = (
            columns=("actuator",), states=1, check=rules.check_actuator, frees=_LIMITED),
     Effect("friction", "plant", ("haploop.plant.friction.stick_slip", *RUBBING, *CHAIN), "motion",
            "dry friction brakes what slips and holds what has stopped", columns=("friction",), linear=False,
-           batches=_goes_by_whole_steps, check=rules.check_friction, frees={"friction": rules.left_out("friction")},
+           batches=_goes_by_whole_steps, check=rules.check_friction, frees={"friction": rules.frictionless},
            scaled_with={"friction": "friction.breakaway"}),
     Effect("accelerometer.bandwidth", "plant", CHAIN, "motion", "the accelerometer measures through a low-pass",
            states=1, used=accelerometer_is_used),

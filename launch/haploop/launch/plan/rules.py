@@ -163,6 +163,16 @@ def noiseless(scene: Scene) -> Scene:
     return without(scene, "accelerometer.noise_density") if value_at(scene, "accelerometer.noise_density") else scene
 
 
+def frictionless(scene: Scene) -> Scene:
+    """Removes dry friction; returns the scene itself if its friction is 0."""
+    return without(scene, "friction") if has_friction(scene) else scene
+
+
+def has_friction(scene: Scene) -> bool:
+    """Tells whether there is friction, which a scene may have set to 0."""
+    return bool(scene.friction and (scene.friction.kinetic or scene.friction.breakaway))
+
+
 def rigid(scene: Scene) -> Scene:
     cable, device = scene.transmission, scene.device
     if cable is None:

@@ -11,6 +11,7 @@ from haploop.launch.batch.batch import Batch
 from haploop.launch.batch.stacking import device_of, is_batchable, structures
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.spec import RunFailed
+from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.judge import is_watched, with_verdict
 from haploop.launch.stability.judge_batch import judge_batch
 from haploop.logger.summary import OF_THE_MACHINE, Summary
@@ -131,8 +132,9 @@ def with_verdicts(batch: Batch, scenes: Sequence[Scene]) -> list[Summary | None]
         watched = []
     end = batch.end(watched) if watched else None
     found = dict(zip(end.numbers.tolist(), judge_batch(end), strict=True)) if end else {}
+    diverged = Finding("diverged", "diverged")
     return [
-        result and with_verdict(scene, result, lambda index=index: found[index])
+        result and with_verdict(scene, result, lambda index=index: found.get(index, diverged))
         for index, (scene, result) in enumerate(zip(scenes, results, strict=True))
     ]
 

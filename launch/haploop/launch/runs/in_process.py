@@ -16,7 +16,6 @@ from haploop.launch.stability.causes import with_causes
 from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.judge import end_at, judge, with_verdict
 from haploop.launch.stability.looks import LOOKS_S
-from haploop.launch.stability.still_hand import End
 from haploop.logger.session import LogSession, open_session
 from haploop.logger.summary import Summary
 from haploop.plant.plant import Plant
@@ -53,7 +52,7 @@ def run_in_process(
         on_progress: called from time to time with the logger's status.
         memory: where to log without a directory.
         stop: asked after every block; True ends the run there.
-        causes: whether a loop that swings at the end is tried without its delay, counts and elements.
+        causes: whether a loop that swings at the end is tried without each of its parts.
 
     Raises:
         RunFailed: an element raised, or gave something that is not a number.
@@ -88,11 +87,13 @@ class Loop:
         WhereItPays.may_wait = True
         self._plant, self._controller = Plant(scene, time), Controller(scene, time, kinds)
         self._scene, self._session = scene, session
+        self._events: list[tuple[int, Event]] = []
         self._end = time.ticks
         self._block = BlockLength(time.block_ticks(scene.run))
         session.logger.start(self._plant.state(), [])
 
     def schedule(self, events: list[tuple[int, Event]]) -> None:
+        self._events += events
         for tick, event in events:
             self._session.logger.event(tick, event)
             if is_change(event):
@@ -120,6 +121,7 @@ class Loop:
         refused, restored = self._controller.recorder.take_told()
         for event in (*map(refusal, refused), *restored):
             logger.event(self._controller.tick, event)
+            self._events.append((self._controller.tick, event))
 
     def end_here(self) -> None:
         self.schedule([(self._plant.tick, {"stop": True})])
@@ -140,9 +142,7 @@ class Loop:
 
         def find() -> Finding:
             [inside] = logger.window.contacts(np.zeros(1, np.intp))
-            end = end_at(self._scene, self._plant, self._controller, inside)
-            if not isinstance(end, End):
-                return end
+            end = end_at(self._scene, self._plant, self._controller, inside, self._events)
             found = judge(end, LOOKS_S, thorough=True)
             return with_causes(end, found) if causes else found
 

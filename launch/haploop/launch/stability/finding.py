@@ -71,9 +71,10 @@ class Finding:
         hardest_N: for a loop that rests then too, the hardest hold that its hand reached; None if that was about the
             last one, or if the hand does not move.
         at_hardest: what it does there: rests, swings on, or undecided; None if not asked.
-        without: for a loop that swings, what it does without its ``delay``, with a much finer ``encoder``, without its
-            ``elements``, and without ``all`` of these if it swings without any one of them: rests, swings less (than a
-            third as wide), swings otherwise (at another frequency), swings on, or undecided; None if not asked.
+        without: for a loop that swings, what it does without each of its parts, by the part's name, such as
+            ``friction``; at a higher control rate (``sampling and hold``) and without ``all`` of these if it swings
+            without any one of them: rests, swings less (than a third as wide), swings otherwise (at another frequency),
+            swings on, or undecided. None if not asked, or if it does not swing when started anew.
         settles_s: how long after the push it came within 5 % of where it rests; None if it does not.
         memory_drifts: whether the memory of an element still changes while the loop rests.
     """

@@ -10,6 +10,7 @@ import numpy as np
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element
+from haploop.launch.plan.rules import has_friction
 from haploop.launch.scene.events import scene_events
 from haploop.launch.stability.causes import with_causes
 from haploop.launch.stability.finding import Finding
@@ -19,7 +20,6 @@ from haploop.launch.stability.looks import (
     LOOKS_S,
     PATIENT_S,
     SMALLER,
-    has_friction,
     is_struck,
     moved_beside,
     parts,
@@ -31,7 +31,7 @@ from haploop.logger.summary import Summary, finite, write_summary
 from haploop.logger.verdict.measures import window_span
 from haploop.logger.verdict.window import keep_steps
 from haploop.plant.plant import Plant
-from haploop.protocol.changes import Event, is_change
+from haploop.protocol.changes import Event, at_work, changes_of, is_change, refusal
 from haploop.protocol.scene.effects import Friction
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
@@ -57,7 +57,7 @@ def judge_scene(
         looks_s: times since the push at which the loop is looked at until it tells.
         blows: what one that rests is struck with, as shares of its push.
         thorough: whether one that rests is tried without its friction and elsewhere within an encoder's count, too.
-        causes: whether one that swings is tried without its delay, counts and elements.
+        causes: whether one that swings is tried without each of its parts, see ``with_causes``.
         on_exchange: called whenever the plant asks for commands.
 
     Raises:
@@ -65,8 +65,6 @@ def judge_scene(
         ArithmeticError: the plant's arithmetic failed.
     """
     end = end_of(scene, kinds, events, on_exchange)
-    if not isinstance(end, End):
-        return end
     found = judge(end, looks_s, blows=blows, thorough=thorough)
     return with_causes(end, found) if causes else found
 
@@ -76,11 +74,12 @@ def end_of(
     kinds: Mapping[str, type[Element]],
     events: Sequence[tuple[int, Event]] | None = None,
     on_exchange: Callable[[], object] = lambda: None,
-) -> End | Finding:
-    """Returns the end of a run, or the finding on one that diverged or ended out of contact."""
+) -> End:
+    """Returns the end of a run."""
     time = Timebase.from_scene(scene)
     plant, controller, ticks = Plant(scene, time), Controller(scene, time, dict(kinds)), time.ticks
-    for tick, event in scene_events(scene, time) if events is None else events:
+    events = scene_events(scene, time) if events is None else events
+    for tick, event in events:
         if is_change(event):
             controller.schedule(tick, event)
             plant.schedule(tick, event)
@@ -93,12 +92,13 @@ def end_of(
 
     plant.run_until(ticks, exchange)
     plant.take_block()
-    if plant.stop_reason:
-        return Finding("diverged", "diverged", detail=plant.stop_reason)
     rows = b"".join(block["columns"]["in_contact"] for block in controller.recorder.take())
+    refused, restored = controller.recorder.take_told()
+    told = [(plant.tick, event) for event in (*map(refusal, refused), *restored)]
     n = time.steps_per_tick
-    window = window_span(ticks * n, keep_steps(time.plant_rate), n)
-    return end_at(scene, plant, controller, np.frombuffer(rows)[ticks - window.ticks :] > 0.0, on_exchange)
+    window = window_span(plant.reached * n, keep_steps(time.plant_rate), n)
+    inside = np.frombuffer(rows)[plant.reached - window.ticks : plant.reached] > 0.0
+    return end_at(scene, plant, controller, inside, [*events, *told], on_exchange)
 
 
 def end_at(
@@ -106,22 +106,26 @@ def end_at(
     plant: Plant,
     controller: Controller,
     inside: np.ndarray,
+    events: Sequence[tuple[int, Event]],
     on_exchange: Callable[[], object] = lambda: None,
-) -> End | Finding:
+) -> End:
     """Returns the end of a run whose blocks have been taken.
 
     Args:
-        scene: what was run.
+        scene: what the run began with.
         plant, controller: in their state at the end.
         inside: whether each of the last ticks was in contact, shape (ticks,).
+        events: (tick, event) of the run, with those that tell which changes were refused or taken back.
         on_exchange: called whenever a plant that continues from there asks for commands.
     """
+    time, told = Timebase.from_scene(scene), None
     if plant.stop_reason:
-        return Finding("diverged", "diverged", detail=plant.stop_reason)
-    if not inside.any():
-        return Finding("no-contact", "no contact")
-    time = Timebase.from_scene(scene)
-    return End(scene, time, plant, controller, hold_of(scene, time, plant.reached, inside), on_exchange)
+        told = Finding("diverged", "diverged", detail=plant.stop_reason)
+    elif not inside.any():
+        told = Finding("no-contact", "no contact")
+    hold_N = hold_of(scene, time, plant.reached, inside if inside.any() else ~inside)
+    now = at_work(scene, [change for change in changes_of(events) if change.tick < plant.tick])
+    return End(now, time, plant, controller, hold_N, told, on_exchange)
 
 
 def is_watched(scene: Scene, summary: Summary) -> bool:
@@ -133,7 +137,7 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
     """Returns the summary of a run with the verdict that its scene asks for, and writes it into the run's directory.
 
     Args:
-        find: returns the finding on the end of the run; not called if the run failed, diverged, or kept off the wall.
+        find: returns the finding on the end of the run; not called if the run failed or kept off the wall.
 
     Raises:
         LogError: the summary could not be written.
@@ -142,7 +146,7 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
         untouched = summary["verdict"] == "no-contact"
         finding = Finding("no-contact", "no contact") if untouched else find()
     elif scene.run.verdict == "pushed" and summary["ended"] == "diverged":
-        finding = Finding("diverged", "diverged", detail=summary["why"])
+        finding = Finding("diverged", "diverged", detail=summary["why"], without=find().without)
     else:
         return summary
     window = summary["window"]
@@ -156,7 +160,7 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
 def judge(
     end: End, looks_s: Sequence[float] = PATIENT_S, *, blows: Sequence[float] = BLOWS, thorough: bool = False
 ) -> Finding:
-    """Returns whether a loop, continued from the end of a run in contact, forgets its start.
+    """Returns whether a loop, continued from the end of a run, forgets its start; a run out of contact is not pushed.
 
     The hand is held still with the mean force of its last contacts, noise is switched off, and two copies of the loop
     are pushed, one ten times as hard as the other. Any motion a second later is the loop's own. Most loops show their
@@ -166,6 +170,8 @@ def judge(
     friction, and one that rests without friction also where it lies a third and two thirds of an encoder's count
     deeper. A loop that rests at the last hold of a moving hand is also judged at that hand's hardest hold.
     """
+    if end.told:
+        return end.told
     push_N = push_of(end.hold_N, end.scene.hand, end.wall_m)
     pushes_N = push_N * SMALLER, push_N
     found, x = watch(end, pushes_N, looks_s)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from haploop.launch.batch.batch import BatchEnd
+from haploop.launch.plan.rules import has_friction
 from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.looks import (
     BESIDE,
@@ -16,7 +17,6 @@ from haploop.launch.stability.looks import (
     SMALLER,
     failed,
     findings,
-    has_friction,
     is_struck,
     left_limit,
     parts,

@@ -104,11 +104,6 @@ def findings(
     return [decide(swing, last=last) for swing in swings]
 
 
-def has_friction(scene: Scene) -> bool:
-    """Tells whether there is friction, which a scene may have set to 0."""
-    return bool(scene.friction and (scene.friction.kinetic or scene.friction.breakaway))
-
-
 def is_smooth(scene: Scene) -> bool:
     """Tells whether nothing but the encoder rounds, nothing saturates, and no estimator filters small swings more.
 

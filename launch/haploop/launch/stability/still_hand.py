@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from haploop.controller.controller import Controller
+from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.memory_drift import look_ticks, memory_of
 from haploop.plant.motion.hand_force import HandForce
 from haploop.plant.plant import Plant
@@ -35,9 +36,12 @@ class End:
     """The end of a run.
 
     Attributes:
-        scene, time: what was run, and its timebase.
+        scene: what was at work at the end, after all changes.
+        time: its timebase.
         plant, controller: in their state at the end, with their blocks taken.
-        hold_N: the force at which the hand is held from there on.
+        hold_N: the force at which the hand is held from there on; after a run that ended out of contact, the mean
+            force of its last ticks.
+        told: the finding if the end alone tells it: diverged or out of contact. None if the loop is to be pushed.
         on_exchange: called whenever a plant that continues from there asks for commands.
     """
 
@@ -46,6 +50,7 @@ class End:
     plant: Plant
     controller: Controller
     hold_N: float
+    told: Finding | None = None
     on_exchange: Callable[[], object] = lambda: None
 
     @property
@@ -165,12 +170,12 @@ def deeper_holds(scene: Scene, wall: Wall, hold_N: float) -> list[float]:
     press_N = press_of(hold_N, scene.hand, wall.position)
     if scene.encoder is None or not wall.inward:
         return []
-    count_m, depth_m = scene.encoder.resolution, _depth_of(wall, abs(press_N))
+    count_m, depth_m = scene.encoder.resolution, depth_of(wall, abs(press_N))
     count_N = wall.held(depth_m + count_m) - wall.held(depth_m) + _stiffness_of(scene.hand) * count_m
     return [hold_N + math.copysign(part * count_N, press_N) for part in _DEEPER] if count_N > 0.0 else []
 
 
-def _depth_of(wall: Wall, press_N: float) -> float:
+def depth_of(wall: Wall, press_N: float) -> float:
     """Returns the depth, m, at which a wall balances a press; one metre if it answers with less there."""
     low, high = 0.0, 1.0
     for _ in range(60):

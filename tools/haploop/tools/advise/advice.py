@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Self
 
+from haploop.launch.plan.idealised import idealised
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.stability.judge import judge_scene
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.advise.changes import Borne, assumed_otherwise, changed_limits, changes, idealised
+from haploop.tools.advise.changes import Borne, assumed_otherwise, changed_limits, changes
 from haploop.tools.advise.families import Values
 from haploop.tools.advise.known import PUBLISHED, Formula, Published, formulas
 from haploop.tools.advise.search import Found, search
@@ -182,7 +183,8 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
         if of.safe
     ]
     stage("changes of the device")
-    altered, ideal, otherwise = changes(loop), idealised(loop), assumed_otherwise(loop, keys)
+    altered, otherwise = changes(loop), assumed_otherwise(loop, keys)
+    ideal = {f"no {name}": changed for name, changed in idealised(loop).items()}
     loops = [loop, *altered.values(), *ideal.values(), *otherwise.values()]
     base, *others = changed_limits(trial, loops, found)
     borne = iter(others)

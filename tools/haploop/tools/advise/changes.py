@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from haploop.launch.plan.effects import all_effects
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.families import Values, around, scaled_values
@@ -48,19 +47,6 @@ def changes(loop: Scene) -> dict[str, Scene]:
         found["ticks twice as often"] = with_value(loop, "clock.control_rate", rate)
     if clock.round_trip_delay:
         found[f"{DELAY} halved"] = with_value(loop, "clock.round_trip_delay", delay_s(loop, 0.5))
-    return found
-
-
-def idealised(loop: Scene) -> dict[str, Scene]:
-    """Returns loops that each lack one cause of buzzing, as no change of a device can achieve: they show the cause."""
-    found = {f"no {DELAY}": with_value(loop, "clock.round_trip_delay", 0.0)} if loop.clock.round_trip_delay else {}
-    for name in dict.fromkeys(name for effect in all_effects() for name in effect.frees):
-        changed = loop
-        for effect in all_effects():
-            if name in effect.frees and effect.is_in(changed):
-                changed = effect.frees[name](changed)
-        if changed is not loop:
-            found[f"no {name}"] = changed
     return found
 
 

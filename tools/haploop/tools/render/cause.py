@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from haploop.tools.render.units import amount
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from haploop.logger.summary import Summary
 
@@ -25,32 +25,24 @@ _WALL = (
     "{when}, the wall gave the device {energy} more than an ideal one would have, {share:.0f} % of it "
     "because {because}."
 )
-# Parts that a judged loop is tried without: the part, and the loop without it.
-_PARTS = {
-    "delay": ("the delay", "without its delay"),
-    "encoder": ("the encoder's counts", "with an encoder 1000 times as fine"),
-    "elements": ("the dissipation elements", "without its elements"),
-    "all": ("", "without all of these"),
-}
+# What a loop does without its parts, in the order in which it is told.
 _DOES = {
-    "rests": "rests {}",
-    "swings less": "swings less than a third as wide {}",
-    "swings otherwise": "swings at another frequency {}",
-    "swings on": "swings on {}",
-    "undecided": "is undecided {}",
+    "rests": "rests without {}",
+    "swings less": "swings less than a third as wide without {}",
+    "swings otherwise": "swings at another frequency without {}",
+    "swings on": "swings on without {}",
+    "undecided": "is undecided without {}",
 }
+_ALL = {"all": "all of these at once"}
 _SEVERAL = "{} together: taking out any one of them is enough"
 _MOSTLY = "mostly {}"
 _NO_SINGLE_ONE = "no single part, since it swings without any one of them"
-_NOT_FOUND = (
-    "not found by these trials; the hold of each force over a tick, jitter, a cable, the actuator, the wall's own "
-    "damping and its stiffness were not tried"
-)
+_NOT_FOUND = "not found by these trials; what they leave is the wall itself, the hand, and the filters of the estimates"
 _UNTOLD = "not determined by these trials"
 # Below this share most of what is seen is the hand's motion, noise, or dies away.
 _HALF = 0.5
 _SMALL_SHARE = "of the {:.0%} of the oscillation that the loop sustains alone, "
-_TRIED = "{cause}. Continued from the end of the run, the loop {trials}."
+_TRIED = "{cause}. Started anew on the wall, the loop {trials}."
 _BY_BOOKS = "According to the books of the whole run"
 # The books of wall and elements are those of the commands, and the actuator has one of its own.
 _LIMITED = " That counts what was commanded: the actuator's limits kept {kept} of it back."
@@ -77,15 +69,19 @@ def by_trial(without: Mapping[str, str] | None) -> str:
     """Returns the likely cause and its trials, given ``without`` of a summary's ``stability``; "" without trials."""
     if not without:
         return ""
-    tried = [_DOES[does].format(_PARTS[name][1]) for name, does in without.items()]
-    trials = " and ".join(filter(None, [", ".join(tried[:-1]), tried[-1]]))
+    told = {does: [_ALL.get(name, name) for name, did in without.items() if did == does] for does in _DOES}
+    trials = "; ".join(_DOES[does].format(_listed(names, "or")) for does, names in told.items() if names)
     return _TRIED.format(cause=_cause_by_trial(without), trials=trials)
+
+
+def _listed(names: Sequence[str], last: str) -> str:
+    return f" {last} ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
 
 
 def _cause_by_trial(without: Mapping[str, str]) -> str:
     for does, words in (("rests", "{}"), ("swings less", _MOSTLY)):
-        if parts := [_PARTS[name][0] for name, did in without.items() if did == does and name != "all"]:
-            return (_SEVERAL if does == "rests" and len(parts) > 1 else words).format(" and ".join(parts))
+        if parts := [name for name, did in without.items() if did == does and name != "all"]:
+            return (_SEVERAL if does == "rests" and len(parts) > 1 else words).format(_listed(parts, "and"))
     if "undecided" in without.values():
         return _UNTOLD
     return _NO_SINGLE_ONE if without.get("all") in ("rests", "swings less") else _NOT_FOUND

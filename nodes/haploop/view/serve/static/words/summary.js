@@ -5,13 +5,6 @@ import { byId, make } from "../dom.js";
 import { isJudged, told } from "./header.js";
 
 const CAUSES = { sampling_and_hold_J: "sampling and hold", quantisation_J: "quantisation", delay_J: "delay" };
-// Trials of a loop that swings, by the part that was taken out.
-const WITHOUT = {
-  delay: "without its delay",
-  encoder: "encoder 1000 times as fine",
-  elements: "without its elements",
-  all: "without all of these",
-};
 const HOW = { done: "to its end", stopped: "stopped early", diverged: "ended by divergence", failed: "failed" };
 
 /** Show the summary of a state and where it lies; hidden while there is none. */
@@ -46,7 +39,7 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
     ...(found.blown ? { [`after a blow of ${amount(found.blow_N, "N")}`]: found.blown } : {}),
     ...(found.deeper ? { [`held ${amount(found.deeper_N, "N")} harder`]: found.deeper } : {}),
     ...(found.frictionless ? { "without its friction": found.frictionless } : {}),
-    ...Object.fromEntries(Object.entries(found.without ?? {}).map(([part, does]) => [WITHOUT[part] ?? part, does])),
+    ...Object.fromEntries(Object.entries(found.without ?? {}).map(([part, does]) => [`without ${part}`, does])),
     ...(isNumber(found.own_share) ? { "its share of the run's swing": share(found.own_share) } : {}),
   };
 }

@@ -1,0 +1,56 @@
+"""Idealised loops: a scene without one part of it that may cause a swing, for each such part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from haploop.launch.plan.effects import all_effects
+from haploop.protocol.scene.paths import value_at, with_value
+from haploop.protocol.scene.scene import Scene
+
+DELAY = "round-trip delay"
+WALL_DAMPING, HOLD = "wall damping", "sampling and hold"
+# The control rate is raised by at most this.
+_FASTER = 10
+
+
+def idealised(scene: Scene) -> dict[str, Scene]:
+    """Returns a resolved scene without each part of the device and its line that is not ideal, by the part's name.
+
+    The parts are the round-trip delay and what effects free a scene of (``Effect.frees``): structural mode, actuator,
+    friction, noise, quantisation, jitter and loss.
+    """
+    found = {DELAY: with_value(scene, "clock.round_trip_delay", 0.0)} if scene.clock.round_trip_delay else {}
+    for name in dict.fromkeys(name for effect in all_effects() for name in effect.frees):
+        changed = scene
+        for effect in all_effects():
+            if name in effect.frees and effect.is_in(changed):
+                changed = effect.frees[name](changed)
+        if changed is not scene:
+            found[name] = changed
+    return found
+
+
+def uncontrolled(scene: Scene) -> dict[str, Scene]:
+    """Returns a resolved scene without each part of its controller but the wall's stiffness, by the part's name.
+
+    The parts are each dissipation element, and the damping of the wall.
+    """
+    elements = scene.dissipation
+    found = {
+        f"element {place} ({table.name})": replace(scene, dissipation=elements[:place] + elements[place + 1 :])
+        for place, table in enumerate(elements)
+    }
+    if value_at(scene, "wall.damping"):
+        found[WALL_DAMPING] = with_value(scene, "wall.damping", 0.0)
+    return found
+
+
+def faster(scene: Scene) -> Scene | None:
+    """Returns a resolved scene at ten times the control rate, or the largest multiple that its plant rate allows.
+
+    None if the control rate is the plant rate, or no multiple up to ten divides it.
+    """
+    steps = scene.clock.plant_rate // scene.clock.control_rate
+    times = max(times for times in range(1, _FASTER + 1) if steps % times == 0)
+    return with_value(scene, "clock.control_rate", times * scene.clock.control_rate) if times > 1 else None
