@@ -106,7 +106,7 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
         for wrong in ("wall.stiffness", ["wall.stiffness=2 N/mm"]):
             with pytest.raises(TypeError, match=r'set by key: set\(\{"wall.stiffness": 200\}\)'):
                 loop.set(wrong, 3)  # pyright: ignore[reportArgumentType]
-        with pytest.raises(ValueError, match=r"N is a force, but s is a time\."):
+        with pytest.raises(ValueError, match=r"N is a force; a time was expected, such as s\."):
             loop.swap("damping", at="2 N", damping=1.0)
         assert loop.step(100) == 100
         seen = loop.status()["status"]

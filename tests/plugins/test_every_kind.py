@@ -161,7 +161,7 @@ def test_a_run_is_drawn_without_its_kinds_and_no_later_scene_may_name_them(tmp_p
     assert scene.wall is not None
     assert (scene.wall.kind, scene.wall.others) == ("skin", {"thickness": 4e-4})
     assert Scene.from_dict(scene.as_dict()).as_dict() == scene.as_dict()
-    with pytest.raises(SceneError, match=r'wall.kind is "skin"\. .* A wall of your own needs --plugin FILE\.'):
+    with pytest.raises(SceneError, match=r'wall.kind is "skin"\. .* A wall of your own needs --plugin FILE, in'):
         load(tmp_path / "scene.toml")
 
 

@@ -40,7 +40,7 @@ def test_text_with_a_unit_is_the_same_float_as_the_si_number_to_the_last_bit(tex
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        ("2 ms", "ms is a time, but N/m is a stiffness."),
+        ("2 ms", "ms is a time; a stiffness was expected, such as N/m."),
         ("3 N/m °", "N/m ° contains an angle and cannot be used for N/m."),
         ("5 Ns/mm", '"Ns/mm" is not a unit; leave a space between multiplied units.'),
         ("5", 'Text must carry a unit, such as "5 N/m"'),
@@ -117,8 +117,8 @@ def test_any_text_is_a_number_or_a_sentence(text):
         ("85 gr cm^2", "kg m^2", "gr is the grain, 65 mg; write g."),
         ("85 mgr", "kg", "mgr is a thousandth of the grain, 65 ng; write mg."),
         ("1 ton", "kg", "ton is the short ton, 907 kg; write t, which is 1000 kg."),
-        ("12 Nm", "N", "Nm is a torque or an energy, but N is a force."),
-        ("12 mNm", "N/m", "mNm is a torque or an energy, but N/m is a stiffness."),
+        ("12 Nm", "N", "Nm is a torque or an energy; a force was expected, such as N."),
+        ("12 mNm", "N/m", "mNm is a torque or an energy; a stiffness was expected, such as N/m."),
     ],
 )
 def test_a_name_that_is_another_unit_than_is_mostly_meant_by_it_is_refused(given, unit, sentence):

@@ -55,4 +55,4 @@ def test_units_in_the_header_of_a_recorded_force_are_read(files, tmp_path, csv, 
     (tmp_path / "push.csv").write_text(csv.replace("F [mN]", "m (g)").replace("force (N)", "m (kg)"))
     [mistake] = file_mistakes(path)
     assert "Line 1, the header of time and force:" in mistake
-    assert "is a mass, but" in mistake
+    assert "is a mass; a force was expected" in mistake

@@ -61,7 +61,7 @@ def test_every_mistake_is_reported_at_once():
         run={"pin": 1},
     )
     starts = [
-        'device.damping is "2 ms". ms is a time, but N s/m is a damping.',
+        'device.damping is "2 ms". ms is a time; a damping was expected, such as N s/m.',
         "device.mas is not a key of [device]; did you mean mass? Allowed: mass, damping, position, velocity.",
         'hand.force.kind is "rampp"; did you mean ramp? Allowed: constant, ramp, step, sine, minimum-jerk, trace.',
         "encoder.resolution is nan. It must be a finite number of m.",

@@ -151,7 +151,7 @@ def test_what_stands_after_an_element_that_limits_is_noted_and_nothing_else_is()
         ('encoder = { bits = 4096, range = "0.2 m" }', "is 4096. It must be at most 64. 4096 counts are 12 bits."),
         ('encoder = { bits = 4000, range = "0.2 m" }', '4000 counts over 0.2 m are resolution = "0.2 m / 4000".'),
         ('wall.stiffness = "1 n/mm"', '"n/mm" is not a unit; did you mean N/mm?'),
-        ('wall.stiffness = "1 N/mm^2"', "N/mm^2 is a pressure, but N/m is a stiffness."),
+        ('wall.stiffness = "1 N/mm^2"', "N/mm^2 is a pressure; a stiffness was expected, such as N/m."),
         ('clock.round_trip_delay = "1.55 ms"', 'is "1.55 ms". The round_trip_delay must be a whole number'),
         ('clock.round_trip_delay = "1.55 ms"', "With clock.plant_rate = 20000 it is 31 of them."),
         ('event = [{ at = 0.5, swap = "damping" }]', 'a table, such as { kind = "damping", damping = 0.8 }.'),

@@ -203,7 +203,7 @@ def test_the_last_line_of_check_is_its_verdict_and_the_notes_stand_before_it():
     fig = str(SCENES / "fig6c.toml")
     told = CliRunner().invoke(app, ["check", fig, "--set", "wall.position=-60"]).output.splitlines()
     assert told[-2].startswith("Note: The wall is at -60 m")
-    assert told[-1] == f"{fig} can be run. But see above what is probably unintended."
+    assert told[-1] == f"{fig} can be run. The notes above say what is probably unintended."
     assert CliRunner().invoke(app, ["check", fig]).output.splitlines()[-1] == f"{fig} can be run."
 
 

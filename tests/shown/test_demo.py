@@ -53,7 +53,7 @@ def test_what_a_steady_loop_rests_on_stands_in_the_demo_s_sentence_in_its_colour
     held, free = part("steady"), part("steady")
     held.summary["stability"]["provisos"] = ["only friction holds it"]
     told = story(part("limit-cycle"), held).outcome()
-    assert told == "With damping of 5 N s/m the same wall is steady. Yet: only friction holds it."
+    assert told == "With damping of 5 N s/m the same wall is steady. Condition: only friction holds it."
     assert "Yet" not in story(part("limit-cycle"), free).outcome()
     assert style.verdict_colour(held.summary) != style.verdict_colour(free.summary) == style.VERDICTS["steady"]
     about = {"title": "mine", "duration_s": 1.0, "window": {"oscillation_m": 0.0}}

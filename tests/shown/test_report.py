@@ -60,8 +60,8 @@ def test_the_report_ends_with_the_verdict_and_the_first_of_the_notes_and_without
     two = [Note("The wall is soft.", "wall"), Note("The run is long.", "duration")]
     ends = [shown(summary_table(swap, two[:count]), 200).strip().splitlines()[-1] for count in (1, 2)]
     word = swap["verdict"]
-    assert ends[0] == f"{word}  A note on its scene: The wall is soft."
-    assert ends[1] == f"{word}  2 notes on its scene; the first: The wall is soft."
+    assert ends[0] == f"Verdict: {word}. A note on its scene: The wall is soft."
+    assert ends[1] == f"Verdict: {word}. 2 notes on its scene; the first: The wall is soft."
     assert shown(summary_table(swap), 200) in shown(summary_table(swap, two), 200), "all else is as it was"
 
 
@@ -320,7 +320,7 @@ def test_the_report_of_a_run_says_what_it_does_when_it_is_pushed(
     assert "2.00 mm +- 100 µm peak to peak, at 40.0 Hz, felt, chaotic" in told
     assert "400 mN peak to peak" in told
     assert "-1.5 +- 0.015 1/s, watched for 2 s" in told
-    assert "93 % its own" in told
+    assert "93 % is the loop's own; the rest is" in told
     unknown = shown(summary_table({**swap, "stability": {**found, "own_share": None}}), 200)
     assert "its own" not in unknown
     rests = shown(

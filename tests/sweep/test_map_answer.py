@@ -73,8 +73,8 @@ def test_what_a_steady_verdict_rests_on_is_told_with_the_answer_and_counted() ->
     results += [said("limit-cycle", 1e-3), said("limit-cycle", 1e-3)]
     told = legend(make_figure(table(axes, cells_of(axes), results, [None] * 6)))
     assert "Stiffest steady wall: 200 N/m at dissipation.0.damping 0.2 N s/m" in told
-    assert "Yet: only friction holds it." in told
-    assert "Of the steady runs: only friction holds it (2)." in told
+    assert "Condition: only friction holds it." in told
+    assert "Conditions of the steady runs: only friction holds it (2)." in told
     assert "No run was pushed" not in told
 
 

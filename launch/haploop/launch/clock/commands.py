@@ -261,7 +261,7 @@ class Commands:
                 tick, _ = self._reloads.change(back, None, code, former[2])
             else:
                 tick = self._clock.change(back)
-            text, data = f"{what} is undone: {describe(back, units)} at {self._at(tick)}", {"tick": tick, **back}
+            text, data = f"undone: {what}; {describe(back, units)} at {self._at(tick)}", {"tick": tick, **back}
         self._forget(asked)
         return text, data
 

@@ -35,7 +35,7 @@ _TAGGED = {("hand", "force"), ("jitter",), ("dissipation", 0), ("event", 0, "swa
 # What may not be a mistake once the missing file is there.
 _ELSEWHERE = ("missing", "union_tag_not_found")
 _SOME_S = 1.0
-_OWN_KIND = " {} of your own needs --plugin FILE."
+_OWN_KIND = " {} of your own needs --plugin FILE, in a running loop when that is started."
 # What a plugin file may bring, by the last keys of the place where it is named.
 _OWN: dict[KeyPath, str] = {
     ("wall", "kind"): "A wall",

@@ -176,7 +176,8 @@ _TRAPS = {
 def _another_dimension(unit: str, dimension: object, target: str, wanted: object) -> str:
     given, named = _QUANTITIES.get(str(dimension)), _QUANTITIES.get(str(wanted))
     if given and named:
-        return f"{unit} is {given}, but {target} is {named}."
+        example = f", such as {target}" if target else ""
+        return f"{unit} is {given}; {named} was expected{example}."
     return f"{unit or 'A bare number'} has the dimension {dimension}, but {target or 'a bare number'} has {wanted}."
 
 

@@ -141,7 +141,9 @@ def _terms(scene: Scene, planned: Plan) -> Table:
     own_N_s_m = next(damping for body, damping in chain.grounded.values() if body == 0)
     facts = {
         "period T, delay": f"{amount(period_s, 's')}, {amount(delay_s, 's')} ({ticks:g} tick{'s' * (ticks != 1)})",
-        "masses m": ", ".join(f"{name} {amount(mass * 1e3, 'g')}" for name, mass in planned.bodies.items()),
+        "masses m": ", ".join(
+            f"{_moving(scene, name)} {amount(mass * 1e3, 'g')}" for name, mass in planned.bodies.items()
+        ),
         "dampers b": f"{', '.join(dampers)} N s/m",
         "springs": ", ".join(springs) or "none",
         "wall K": spring(scene.wall.stiffness) + changes if scene.wall else "none",
@@ -152,6 +154,12 @@ def _terms(scene: Scene, planned: Plan) -> Table:
         facts["2 f_c / q"] = spring(2.0 * scene.friction.kinetic / scene.encoder.resolution)
     facts["states"] = f"{len(planned.states)}: {', '.join(planned.states)}"
     return make_facts(facts.items())
+
+
+def _moving(scene: Scene, body: str) -> str:
+    """Returns what moves as a body: a hand without a grip moves with the last one."""
+    with_hand = scene.hand and scene.hand.mass and not scene.hand.grip and body in ("device", "tip")
+    return f"{body} and hand" if with_hand else body
 
 
 def _limits(scene: Scene, limits: list[Limit]) -> RenderableType:
@@ -170,8 +178,12 @@ def _limits(scene: Scene, limits: list[Limit]) -> RenderableType:
         table.add_row(
             limit.name, limit.kind, spring(limit.stiffness_N_m), Text("; ".join(filter(None, [share, limit.why_not])))
         )
-    why = [Text(f"No limit by {'; '.join(names)}: {reason}", "dim") for reason, names in silent.items()]
+    why = [Text(f"No limit by {' or '.join(map(_quoted, names))}: {reason}", "dim") for reason, names in silent.items()]
     return Group(*([table] if table.row_count else []), *why)
+
+
+def _quoted(name: str) -> str:
+    return f'"{name}"'
 
 
 def _count(scene: Scene, count: OneCount) -> Table:

@@ -83,7 +83,7 @@ def check(
         if notes(resolved, kinds):
             print(file=sys.stderr)  # sets the notes apart from all that is above
         noted = print_notes(resolved, kinds, scene, set or [])
-        but = " But see above what is probably unintended." if noted else ""
+        but = " The notes above say what is probably unintended." if noted else ""
         print(f"{scene} can be run{with_a}.{no_wall}{but}", file=sys.stderr)
 
 

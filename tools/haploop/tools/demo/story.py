@@ -96,7 +96,7 @@ class Story:
     def outcome(self) -> str:
         """Returns what the swap did, as a sentence."""
         steady = self.before.verdict == "steady", self.after.verdict == "steady"
-        provisos = f" Yet: {', '.join(self.after.provisos)}." if self.after.provisos else ""
+        provisos = f" Condition: {', '.join(self.after.provisos)}." if self.after.provisos else ""
         return OUTCOME[steady].format(element=self.element) + provisos
 
 

@@ -97,7 +97,9 @@ def summary_table(summary: Summary, notes: Sequence[Note] = ()) -> RenderableTyp
     parts += [Text(sentence, style="bold yellow") for sentence in told_too]
     parts += [Text(_ITS_WORD.format(words.split()[0])) for words, _ in program_rows(summary)]
     control_rate = summary["ticks"] / summary["duration_s"] if summary["duration_s"] else 1.0
-    end = [Text.assemble((word, verdict_style(word)), "  ", (noted(notes), "bold yellow"))] if notes else []
+    end = (
+        [Text.assemble("Verdict: ", (word, verdict_style(word)), ". ", (noted(notes), "bold yellow"))] if notes else []
+    )
     return Group(*parts, make_facts(_key_figures(summary)), _books(summary["energy"], control_rate), *end)
 
 
@@ -228,7 +230,8 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     if (share := found.get("own_share")) is not None:
         beside = found.get("moved_beside", ("the hand's motion", "noise"))
         own = f"{100 * share:.0f} %" if share >= 0.01 else "less than 1 %"
-        rows.append(("of the oscillation", f"{own} its own; the rest: {' or '.join([*beside, 'dying away'])}"))
+        rest = f"; the rest is {' or '.join([*beside, 'dying away'])}" if share < 0.995 else ""
+        rows.append(("of the oscillation", f"{own} is the loop's own{rest}"))
     if (settles_s := found.get("settles_s")) is not None:
         rows.append(("settles within", f"{amount(settles_s, 's')}, to 5 %"))
     if blown := found.get("blown"):

@@ -79,8 +79,8 @@ def _answer(data: MapData, cells: Cells) -> str:
     stiffest, softer = _STIFFEST[data.is_unpushed]
     more = "No stiffer wall was tried." if found.open_end else softer
     told = data.provisos(int(cells.row[found.index]))
-    yet = f" Yet: {', '.join(told)}." if told else ""
-    return f"★ {stiffest}: {spring(found.value)}{others}. {more}{yet}"
+    on = f" Condition: {', '.join(told)}." if told else ""
+    return f"★ {stiffest}: {spring(found.value)}{others}. {more}{on}"
 
 
 def _provisos(data: MapData) -> str:
@@ -89,7 +89,7 @@ def _provisos(data: MapData) -> str:
         proviso for row in np.flatnonzero(data.verdicts == Verdict.STEADY).tolist() for proviso in data.provisos(row)
     )
     listed = ", ".join(f"{proviso} ({count})" for proviso, count in counts.most_common())
-    return f"Of the steady runs: {listed}." if listed else ""
+    return f"Conditions of the steady runs: {listed}." if listed else ""
 
 
 def _place(at: Iterable[tuple[Axis, int]]) -> str:
