@@ -19,13 +19,14 @@ from haploop.launch.stability.judge import judge_scene
 from haploop.logger.log.recording import MemoryLog
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Scene
-from haploop.tools.advise.advice import advice_data, advised_scene, ending_with, is_ideal
+from haploop.tools.advise.advice import advice_data
 from haploop.tools.advise.families import DAMPING
 from haploop.tools.advise.known import PUBLISHED, formulas
 from haploop.tools.advise.report import assumes, describe_hand
 from haploop.tools.advise.search import Found
+from haploop.tools.advise.shown import advised_scene, ending_with
 from haploop.tools.advise.subject import Assumed, make_subject
-from haploop.tools.advise.walls.cases import Case, make_loop
+from haploop.tools.advise.walls.cases import Case, is_ideal, make_loop
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.withstand import Best, rounded_down
 from haploop.tools.cli.app import app

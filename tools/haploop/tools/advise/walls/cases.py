@@ -102,6 +102,12 @@ def hold_N(loop: Scene) -> float:
     return value_at(loop, "hand.force.value")
 
 
+def is_ideal(loop: Scene) -> bool:
+    """Tells whether nothing of the device lags: no cable, no bandwidth of the actuator, no delay."""
+    lags = loop.transmission or (loop.actuator and loop.actuator.bandwidth is not None)
+    return not lags and not loop.clock.round_trip_delay
+
+
 def slowness(loop: Scene) -> float:
     """Returns how many times as long as usual everything takes if the delay is long or the hand swings slowly."""
     chain = Chain.from_scene(loop)
