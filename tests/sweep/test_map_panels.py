@@ -100,7 +100,7 @@ def test_steady_cells_with_a_proviso_are_hatched_and_counted(axes: dict[str, lis
     held = {"provisos": ["only friction holds it"]}
     results = [said("steady", 1e-7), said("steady", 1e-7) | held, *[said("limit-cycle", 1e-4)] * 2]
     drawn = make_figure(table(axes, cells_of(axes), results, [WITH_DAMPING] * 4))
-    assert "of these with a proviso: 1" in legend(drawn)
+    assert "of these with a condition: 1" in legend(drawn)
     if len(axes) == 2:
         (patch,) = artists(drawn, "hatch with a proviso")
         assert len(patch.get_path().vertices) == 5  # one rectangle

@@ -185,7 +185,8 @@ def _summary_sentences(summary: Summary) -> str:
     rate = summary["rate_1_s"]
     lines = [f"{summary['title']}: {summary['cells']} cells, {describe_counts(summary['counts'])}, {rate:.3g} cells/s"]
     if provisos := summary.get("provisos"):
-        lines.append(f"of the steady cells: {describe_counts(provisos)}")
+        told = ", ".join(f"{proviso} ({count})" for proviso, count in provisos.items())
+        lines.append(f"conditions of the steady cells: {told}")
     if bounds := summary.get("boundaries"):
         undecided = f", {count} of them across undecided cells" if (count := bounds.get("undecided")) else ""
         lines.append(f"boundaries: {bounds['found']} found{undecided}; {bounds['missing']} missing")

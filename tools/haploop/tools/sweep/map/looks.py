@@ -63,7 +63,7 @@ def verdict_signs(
             edge = look.hatch_colour or GREY
             signs.append(Patch(facecolor=look.fill, edgecolor=edge, hatch=look.hatch, linewidth=0.6, label=label))
         if number == Verdict.STEADY and with_proviso:
-            fill, edge, label = PROVISO.fill, PROVISO.hatch_colour, f"of these with a proviso: {with_proviso}"
+            fill, edge, label = PROVISO.fill, PROVISO.hatch_colour, f"of these with a condition: {with_proviso}"
             signs.append(Patch(facecolor=fill, edgecolor=edge, hatch=2 * PROVISO.hatch, linewidth=0.6, label=label))
     return signs
 
