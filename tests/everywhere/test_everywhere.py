@@ -55,6 +55,17 @@ def test_a_python_that_is_not_there_is_told_and_not_guessed(tmp_path):
     assert python_of(Variant("CPython 2.99", python="2.99"), tmp_path) == "there is no python2.99"
 
 
+def test_kernels_that_the_processor_cannot_run_are_told_and_fail_nothing(monkeypatch, capsys, tmp_path):
+    lacking = Variant("OpenBLAS SkylakeX", {"OPENBLAS_CORETYPE": "SkylakeX"}, lacks="AVX512_SKX")
+    monkeypatch.setattr(command, "ROOT", tmp_path)
+    monkeypatch.setattr(command, "bits_of", lambda *_: {"a": "1"})
+    monkeypatch.setattr(command, "of_the_machine", lambda: [lacking])
+    monkeypatch.setattr(command, "of_installations", list)
+    monkeypatch.setattr(sys, "argv", ["everywhere", "--no-tests"])
+    assert command.main() == 0
+    assert "this processor has no AVX512_SKX" in capsys.readouterr().out
+
+
 def test_the_lowest_of_every_direct_dependency_is_what_the_project_allows_in_its_extras_too():
     pins = lowest_direct()
     assert {"numpy==2.1.3", "numba==0.61", "fmpy==0.3.24"} <= {*pins}

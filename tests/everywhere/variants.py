@@ -17,6 +17,8 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 # Kernels of OpenBLAS: the oldest of 64 bits, and those of three families of processors.
 KERNELS = ("Prescott", "Haswell", "Zen", "SkylakeX")
+# What NumPy calls the vector units that a kernel needs; a processor without them ends the program.
+_NEEDS = {"Haswell": "AVX2", "Zen": "AVX2", "SkylakeX": "AVX512_SKX"}
 # What a variant chooses, and no environment of its own accord.
 CHOSEN = ("OPENBLAS_CORETYPE", "OPENBLAS_NUM_THREADS", "NPY_DISABLE_CPU_FEATURES", "GLIBC_TUNABLES")
 EVERY_TEST = ("tests",)
@@ -41,6 +43,7 @@ class Variant:
         python: version of CPython, such as "3.12"; "" for the present one.
         resolution: "locked", or versions that the resolver chooses: "lowest-direct", "highest".
         tests: folders of those that may come to something else in it.
+        lacks: what this processor lacks for it; "" for nothing.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Variant:
     python: str = ""
     resolution: str = "locked"
     tests: tuple[str, ...] = EVERY_TEST
+    lacks: str = ""
 
 
 def of_the_machine() -> list[Variant]:
@@ -62,7 +66,9 @@ def of_the_machine() -> list[Variant]:
         **{f"{count} threads of BLAS": {"OPENBLAS_NUM_THREADS": str(count)} for count in (1, 8)},
         **({"C library without FMA": {"GLIBC_TUNABLES": off}} if sys.platform == "linux" else {}),
     }
-    return [Variant("default"), *(Variant(name, of, tests=CALCULATING) for name, of in chosen.items())]
+    lacks = {f"OpenBLAS {name}": unit for name, unit in _NEEDS.items() if not __cpu_features__.get(unit)}
+    others = (Variant(name, of, tests=CALCULATING, lacks=lacks.get(name, "")) for name, of in chosen.items())
+    return [Variant("default"), *others]
 
 
 def of_installations() -> list[Variant]:
@@ -79,6 +85,8 @@ def python_of(variant: Variant, folder: Path) -> Path | str:
     Installs by the pip of the interpreter that this one's virtual environment was made of, as the Makefile does;
     RuntimeError with the last words of what did not work.
     """
+    if variant.lacks:
+        return f"this processor has no {variant.lacks}"
     if not variant.python and variant.resolution == "locked":
         return Path(sys.executable)
     base = shutil.which(f"python{variant.python}") if variant.python else _base()
