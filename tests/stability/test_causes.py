@@ -64,7 +64,6 @@ def test_a_wall_beyond_the_limit_of_its_control_rate_alone_is_laid_to_sampling_a
     """No delay, no counts to speak of: b > K T / 2 fails at 1 kHz and holds at 10 kHz (Colgate and Schenkel 1997)."""
     scene = demo("wall.stiffness=20000", "clock.round_trip_delay=0", *ANY_FORCE)
     quick = faster(scene)
-    assert quick
     assert quick.clock.control_rate == 10 * scene.clock.control_rate
     assert growth(scene) > 1.0 > growth(quick)
     found = tried(scene)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from haploop.controller.controller import Controller
 from haploop.launch.plan.idealised import HOLD, WALL_DAMPING, faster, idealised, uncontrolled
 from haploop.launch.stability.finding import DOES, Finding
-from haploop.launch.stability.looks import push_of
+from haploop.launch.stability.looks import LOOKS_S, push_of
 from haploop.launch.stability.still_hand import End, depth_of, held, press_of
 from haploop.launch.stability.watch import watch
 from haploop.plant.plant import Plant
@@ -20,8 +20,8 @@ ALL = "all"
 RESTS, LESS, OTHERWISE = "rests", "swings less", "swings otherwise"
 # A swing narrower than this share of the first is less; one whose frequency differs by more than this is another.
 _LESS, _OTHER = 1.0 / 3.0, 1.5
-# Times since the push at which a trial is looked at, s.
-_LOOKS_S = (1.0, 2.0, 4.0, 8.0, 16.0)
+# Ticks for which a trial is watched, at most, unless its first look comes later.
+_MOST_TICKS = 40_000
 # No trial begins with the device moving faster than this, m/s.
 _FASTEST_M_S = 1.0
 
@@ -31,9 +31,10 @@ def with_causes(end: End, found: Finding) -> Finding:
 
     The loop as it stood at the end of the run begins anew: the hand holds it still, without noise, at the depth where
     the wall balances the hand; the device moves as fast as its swing did, v = pi f w for a width w at f Hz. It is
-    pushed as for the verdict and watched for up to 4 s, once as it is and once without each part (see ``idealised`` and
-    ``uncontrolled``). Where no part alone makes a difference, it is also tried at a higher control rate (``HOLD``), and
-    without all of these at once (``ALL``). Nothing is told if the loop as it is does not swing from this start.
+    pushed as for the verdict and watched for up to 16 s, or 40 000 ticks, once as it is and once without each part (see
+    ``idealised`` and ``uncontrolled``). Where no part alone makes a difference, it is also tried at a higher control
+    rate (``HOLD``), and without all of these at once (``ALL``). Nothing is told if the loop as it is does not swing
+    from this start.
 
     A swing less than a third as wide, or at a frequency 1.5 times off, is named as such: the part made most of the
     swing, or another swing takes the place of the first.
@@ -47,8 +48,7 @@ def with_causes(end: End, found: Finding) -> Finding:
     without = idealised(start) | uncontrolled(start)
     does = {name: _does(_watched(end, scene), as_is) for name, scene in without.items()}
     if not _told(does):
-        if faster_one := faster(start):
-            does[HOLD] = _does(_watched(end, faster_one), as_is)
+        does[HOLD] = _does(_watched(end, faster(start)), as_is)
         if len(does) > 1 and not _told(does):
             does[ALL] = _does(_watched(end, _without_all(start)), as_is)
     return replace(found, without=does)
@@ -73,15 +73,16 @@ def _without_all(scene: Scene) -> Scene:
         scene = idealised(scene)[name]
     scene = replace(scene, dissipation=())
     scene = uncontrolled(scene).get(WALL_DAMPING, scene)
-    return faster(scene) or scene
+    return faster(scene)
 
 
 def _watched(end: End, scene: Scene) -> Finding:
     """Returns what a loop does from its beginning, held as at the end of the run."""
     time = Timebase.from_scene(scene)
     plant, controller = Plant(scene, time), Controller(scene, time, end.controller.kinds)
+    looks_s = [look_s for look_s in LOOKS_S if look_s * time.control_rate <= _MOST_TICKS] or LOOKS_S[:1]
     begun = End(scene, time, plant, controller, end.hold_N, on_exchange=end.on_exchange)
-    return watch(begun, (push_of(end.hold_N, scene.hand, begun.wall_m),), _LOOKS_S)[0]
+    return watch(begun, (push_of(end.hold_N, scene.hand, begun.wall_m),), looks_s)[0]
 
 
 def _does(changed: Finding, as_is: Finding) -> str:
