@@ -144,6 +144,17 @@ def test_of_a_run_that_diverged_the_cause_is_told_too() -> None:
 
 
 @pytest.mark.slow
+def test_a_chatter_that_is_left_of_a_loop_that_left_its_limit_is_a_lesser_swing() -> None:
+    """Without the delay 70 µm remain, by the counts: mostly the delay, not "no single part"."""
+    coarse = ("encoder.resolution=2e-4", "actuator.saturation=1e6")
+    scene = demo("wall.stiffness=3000", "clock.round_trip_delay=0.02", "diverged_beyond=0.03", *coarse)
+    found = judge_scene(scene, registry(), causes=True).without
+    assert found
+    assert found[DELAY] == "swings less"
+    assert by_trial(found).startswith("mostly round-trip delay. ")
+
+
+@pytest.mark.slow
 def test_what_rests_or_has_no_wall_is_not_tried() -> None:
     assert not tried(demo("wall.stiffness=100"))
 

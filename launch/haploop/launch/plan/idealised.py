@@ -11,6 +11,8 @@ from haploop.protocol.scene.scene import Scene
 
 DELAY = "round-trip delay"
 WALL_DAMPING, HOLD = "wall damping", "sampling and hold"
+# What damps in a wall, of any kind.
+_OF_WALL = ("wall.damping", "wall.damping_factor")
 # The control rate is raised by this.
 _FASTER = 10
 
@@ -42,9 +44,8 @@ def uncontrolled(scene: Scene) -> dict[str, Scene]:
         f"element {place} ({table.name})": replace(scene, dissipation=elements[:place] + elements[place + 1 :])
         for place, table in enumerate(elements)
     }
-    if value_at(scene, "wall.damping"):
-        found[WALL_DAMPING] = with_value(scene, "wall.damping", 0.0)
-    return found
+    damping = {key: 0.0 for key in _OF_WALL if value_at(scene, key)}
+    return found | ({WALL_DAMPING: with_values(scene, damping)} if damping else {})
 
 
 def faster(scene: Scene) -> Scene:

@@ -36,8 +36,8 @@ def with_causes(end: End, found: Finding) -> Finding:
     rate (``HOLD``), and without all of these at once (``ALL``). Nothing is told if the loop as it is does not swing
     from this start.
 
-    A swing less than a third as wide, or at a frequency 1.5 times off, is named as such: the part made most of the
-    swing, or another swing takes the place of the first.
+    A swing less than a third as wide, or one that lasts where the loop as it is leaves its limit, is less; one at a
+    frequency 1.5 times off is another, which takes the place of the first.
     """
     if found.word not in ("limit-cycle", "growing", "diverged") or not end.controller.params.wall.inward:
         return found
@@ -88,6 +88,8 @@ def _watched(end: End, scene: Scene) -> Finding:
 def _does(changed: Finding, as_is: Finding) -> str:
     """Returns what a changed loop does, compared with the swing of the loop as it is."""
     does = DOES.get(changed.word, "undecided")
+    if does == "swings on" and as_is.why == "leaves the limit" and changed.word == "limit-cycle":
+        return LESS
     if does != "swings on" or not as_is.frequency_Hz or not changed.frequency_Hz:
         return does
     if as_is.word == changed.word == "limit-cycle" and changed.width_m < _LESS * as_is.width_m:
