@@ -144,6 +144,14 @@ def test_of_a_run_that_diverged_the_cause_is_told_too() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("sets", [["device.position=-0.5", "diverged_beyond=0.4"], ["device.velocity=-300"]])
+def test_of_a_device_that_was_thrown_out_or_began_there_no_part_is_the_cause(sets: list[str]) -> None:
+    """The loop itself swings, within its limit, and did not make the run diverge."""
+    found = judge_scene(load("demo", ["event=[]", "wall.position=0", *sets]), registry(), causes=True)
+    assert (found.word, found.without) == ("diverged", None)
+
+
+@pytest.mark.slow
 def test_a_chatter_that_is_left_of_a_loop_that_left_its_limit_is_a_lesser_swing() -> None:
     """Without the delay 70 µm remain, by the counts: mostly the delay, not "no single part"."""
     coarse = ("encoder.resolution=2e-4", "actuator.saturation=1e6")

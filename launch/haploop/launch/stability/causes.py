@@ -34,7 +34,7 @@ def with_causes(end: End, found: Finding) -> Finding:
     pushed as for the verdict and watched for up to 16 s, or 40 000 ticks, once as it is and once without each part (see
     ``idealised`` and ``uncontrolled``). Where no part alone makes a difference, it is also tried at a higher control
     rate (``HOLD``), and without all of these at once (``ALL``). Nothing is told if the loop as it is does not swing
-    from this start.
+    from this start, or does not leave its limit though the run did.
 
     A swing less than a third as wide, or one that lasts where the loop as it is leaves its limit, is less; one at a
     frequency 1.5 times off is another, which takes the place of the first.
@@ -43,7 +43,8 @@ def with_causes(end: End, found: Finding) -> Finding:
         return found
     start = _start(end, found)
     as_is = _watched(end, start)
-    if DOES.get(as_is.word) != "swings on":
+    diverges = as_is.why == "leaves the limit"
+    if DOES.get(as_is.word) != "swings on" or (found.word == "diverged" and not diverges):
         return found
     without = idealised(start) | uncontrolled(start)
     does = {name: _does(_watched(end, scene), as_is) for name, scene in without.items()}

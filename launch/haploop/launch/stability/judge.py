@@ -123,7 +123,8 @@ def end_at(
         told = Finding("diverged", "diverged", detail=plant.stop_reason)
     elif not inside.any():
         told = Finding("no-contact", "no contact")
-    hold_N = hold_of(scene, time, plant.reached, inside if inside.any() else ~inside)
+    held = inside if inside.any() else ~inside
+    hold_N = hold_of(scene, time, plant.reached, held) if held.any() else 0.0  # a run may diverge in its first tick
     now = at_work(scene, [change for change in changes_of(events) if change.tick < plant.tick])
     return End(now, time, plant, controller, hold_N, told, on_exchange)
 
