@@ -206,7 +206,7 @@ def test_readme_shows_what_its_walk_comes_to(reader: Reader) -> None:
     assert "most of the energy that the wall generates is caused by the delay" in README
     assert "Quantisation has no part in it." in README
     assert "without the delay it rests; without quantisation, friction or the actuator's limits it swings on" in README
-    parts = ("actuator limits", "friction", "quantisation")
+    parts = ("actuator limits", "friction", "quantisation", "sampling and hold")
     assert summary["stability"]["without"] == {"round-trip delay": "rests"} | dict.fromkeys(parts, "swings on")
     assert leak["delay_J"] < 0.5 * leak["total_J"] < 0.0
     assert leak["quantisation_J"] > 0.01 * leak["total_J"]

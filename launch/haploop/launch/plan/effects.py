@@ -53,6 +53,7 @@ def _integrators() -> Iterator[Effect]:
                 linear=method.is_exact,
                 batches=False,
                 note=rules.note_growth,
+                frees={} if method.is_exact else {"integration error": rules.exactly},
             )
 
 

@@ -6,11 +6,12 @@ import math
 from dataclasses import replace
 
 from haploop.launch.plan.effects import all_effects
-from haploop.protocol.scene.paths import value_at, with_value, with_values
+from haploop.protocol.scene.paths import value_at, with_value, with_values, without
 from haploop.protocol.scene.scene import Scene
 
 DELAY = "round-trip delay"
-WALL_DAMPING, HOLD = "wall damping", "sampling and hold"
+WALL_DAMPING, LOW_PASS, HOLD = "wall damping", "low-pass of the estimates", "sampling and hold"
+_CUTOFFS = ("velocity.cutoff", "acceleration.cutoff")
 # What damps in a wall, of any kind.
 _OF_WALL = ("wall.damping", "wall.damping_factor")
 # The control rate is raised by this.
@@ -20,8 +21,8 @@ _FASTER = 10
 def idealised(scene: Scene) -> dict[str, Scene]:
     """Returns a resolved scene without each part of the device and its line that is not ideal, by the part's name.
 
-    The parts are the round-trip delay and what effects free a scene of (``Effect.frees``): structural mode, actuator,
-    friction, noise, quantisation, jitter and loss.
+    The parts are the round-trip delay and what effects free a scene of (``Effect.frees``): integration error,
+    structural mode, actuator limits, friction, noise, quantisation, jitter and loss.
     """
     found = {DELAY: with_value(scene, "clock.round_trip_delay", 0.0)} if scene.clock.round_trip_delay else {}
     for name in dict.fromkeys(name for effect in all_effects() for name in effect.frees):
@@ -37,13 +38,16 @@ def idealised(scene: Scene) -> dict[str, Scene]:
 def uncontrolled(scene: Scene) -> dict[str, Scene]:
     """Returns a resolved scene without each part of its controller but the wall's stiffness, by the part's name.
 
-    The parts are each dissipation element, and the damping of the wall.
+    The parts are each dissipation element, the damping of the wall, and the low-pass filters of the estimates.
     """
     elements = scene.dissipation
     found = {
         f"element {place} ({table.name})": replace(scene, dissipation=elements[:place] + elements[place + 1 :])
         for place, table in enumerate(elements)
     }
+    cutoffs = [key for key in _CUTOFFS if value_at(scene, key)]
+    if cutoffs:
+        found[LOW_PASS] = without(scene, *cutoffs)
     damping = {key: 0.0 for key in _OF_WALL if value_at(scene, key)}
     return found | ({WALL_DAMPING: with_values(scene, damping)} if damping else {})
 

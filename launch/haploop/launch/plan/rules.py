@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from haploop.launch.plan.effect import Draft
 from haploop.plant.integrators.registry import find_integrator
 from haploop.protocol.scene.effects import Accelerometer, Actuator, Friction, UniformJitter
-from haploop.protocol.scene.paths import value_at, without
+from haploop.protocol.scene.paths import value_at, with_value, without
 from haploop.protocol.scene.scene import Clock, Hand, Scene
 from haploop.protocol.ticks import whole_count
 
@@ -171,6 +171,10 @@ def frictionless(scene: Scene) -> Scene:
 def has_friction(scene: Scene) -> bool:
     """Tells whether there is friction, which a scene may have set to 0."""
     return bool(scene.friction and (scene.friction.kinetic or scene.friction.breakaway))
+
+
+def exactly(scene: Scene) -> Scene:
+    return with_value(scene, "clock.integrator", "exact")
 
 
 def rigid(scene: Scene) -> Scene:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 from haploop.controller.controller import Controller
-from haploop.launch.plan.idealised import HOLD, WALL_DAMPING, faster, idealised, uncontrolled
+from haploop.launch.plan.idealised import HOLD, LOW_PASS, WALL_DAMPING, faster, idealised, uncontrolled
+from haploop.launch.plan.rules import has_friction
 from haploop.launch.stability.finding import DOES, Finding
 from haploop.launch.stability.looks import LOOKS_S, push_of
 from haploop.launch.stability.still_hand import End, depth_of, held, press_of
@@ -16,14 +16,18 @@ from haploop.plant.plant import Plant
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
-ALL = "all"
+ALL, ELEMENTS = "all", "all elements"
 RESTS, LESS, OTHERWISE = "rests", "swings less", "swings otherwise"
-# A swing narrower than this share of the first is less; one whose frequency differs by more than this is another.
-_LESS, _OTHER = 1.0 / 3.0, 1.5
+# A swing narrower than the first share of another is less, or than the second if it has another frequency, which is one
+# that differs by more than this factor.
+_LESS, _FAR_LESS, _OTHER = 1.0 / 3.0, 0.1, 1.5
 # Ticks for which a trial is watched, at most, unless its first look comes later.
 _MOST_TICKS = 40_000
 # No trial begins with the device moving faster than this, m/s.
 _FASTEST_M_S = 1.0
+_LEAVES = "leaves the limit"
+# A wall that answers with less than this share of the press at any depth does not hold the hand.
+_HOLDS = 0.99
 
 
 def with_causes(end: End, found: Finding) -> Finding:
@@ -32,40 +36,49 @@ def with_causes(end: End, found: Finding) -> Finding:
     The loop as it stood at the end of the run begins anew: the hand holds it still, without noise, at the depth where
     the wall balances the hand; the device moves as fast as its swing did, v = pi f w for a width w at f Hz. It is
     pushed as for the verdict and watched for up to 16 s, or 40 000 ticks, once as it is and once without each part (see
-    ``idealised`` and ``uncontrolled``). Where no part alone makes a difference, it is also tried at a higher control
-    rate (``HOLD``), and without all of these at once (``ALL``). Nothing is told if the loop as it is does not swing
-    from this start, or does not leave its limit though the run did.
+    ``idealised`` and ``uncontrolled``) and at a higher control rate (``HOLD``). Where no element alone makes a
+    difference, it is tried without all of them (``ELEMENTS``); where no single part makes it rest, without all at once
+    (``ALL``). Nothing is told of a wall that does not hold the hand, nor if the loop as it is, from this start,
+    comes to another swing than in its run, to none, or stays within the limit that the run left.
 
-    A swing less than a third as wide, or one that lasts where the loop as it is leaves its limit, is less; one at a
-    frequency 1.5 times off is another, which takes the place of the first.
+    A swing less than a third as wide, or less than a tenth at another frequency, or one that lasts where the loop as it
+    is leaves its limit, is less; one at a frequency 1.5 times off is another, which takes the place of the first.
     """
-    if found.word not in ("limit-cycle", "growing", "diverged") or not end.controller.params.wall.inward:
+    start = _start(end, found) if found.word in ("limit-cycle", "growing", "diverged") else None
+    if start is None or not _is_alike(as_is := _watched(end, start), found):
         return found
-    start = _start(end, found)
-    as_is = _watched(end, start)
-    diverges = as_is.why == "leaves the limit"
-    if DOES.get(as_is.word) != "swings on" or (found.word == "diverged" and not diverges):
-        return found
-    without = idealised(start) | uncontrolled(start)
-    does = {name: _does(_watched(end, scene), as_is) for name, scene in without.items()}
-    if not _told(does):
-        does[HOLD] = _does(_watched(end, faster(start)), as_is)
-        if len(does) > 1 and not _told(does):
-            does[ALL] = _does(_watched(end, _without_all(start)), as_is)
+    parts = idealised(start) | {HOLD: faster(start)} | (elements := uncontrolled(start))
+    does = {name: _does(_watched(end, scene), as_is) for name, scene in parts.items()}
+    if len(start.dissipation) > 1 and not {RESTS, LESS} & {does[name] for name in elements}:
+        does[ELEMENTS] = _does(_watched(end, replace(start, dissipation=())), as_is)
+    if RESTS not in does.values():
+        does[ALL] = _does(_watched(end, _without_all(start)), as_is)
     return replace(found, without=does)
 
 
-def _told(does: Mapping[str, str]) -> bool:
-    return bool({RESTS, LESS} & set(does.values()))
-
-
-def _start(end: End, found: Finding) -> Scene:
-    """Returns the scene that the trials begin with."""
+def _start(end: End, found: Finding) -> Scene | None:
+    """Returns the scene that the trials begin with; None if the wall does not hold the hand."""
     scene, wall = end.scene, end.controller.params.wall
     press_N = abs(press_of(end.hold_N, scene.hand, wall.position))
-    at_m = wall.position + wall.inward * depth_of(wall, press_N)
+    if not wall.inward or wall.held(depth_m := depth_of(wall, press_N)) < _HOLDS * press_N:
+        return None
     v_m_s = wall.inward * min(math.pi * found.frequency_Hz * found.width_m, _FASTEST_M_S)
-    return held(replace(scene, device=replace(scene.device, position=float(at_m), velocity=v_m_s)), end.hold_N)
+    device = replace(scene.device, position=float(wall.position + wall.inward * depth_m), velocity=v_m_s)
+    friction = scene.friction if has_friction(scene) else None  # a table of zeros takes long
+    return held(replace(scene, device=device, friction=friction), end.hold_N)
+
+
+def _is_alike(as_is: Finding, found: Finding) -> bool:
+    """Tells whether a loop that was started anew swings as in its run."""
+    if DOES.get(as_is.word) != "swings on" or (found.word == "diverged" and as_is.why != _LEAVES):
+        return False
+    return as_is.why == _LEAVES or found.word == "diverged" or not _is_other(as_is, found)
+
+
+def _is_other(one: Finding, other: Finding) -> bool:
+    """Tells whether the frequencies of two swings, if they are known, differ."""
+    known = one.frequency_Hz and other.frequency_Hz
+    return bool(known) and not 1.0 / _OTHER < one.frequency_Hz / other.frequency_Hz < _OTHER
 
 
 def _without_all(scene: Scene) -> Scene:
@@ -73,7 +86,8 @@ def _without_all(scene: Scene) -> Scene:
     for name in idealised(scene):
         scene = idealised(scene)[name]
     scene = replace(scene, dissipation=())
-    scene = uncontrolled(scene).get(WALL_DAMPING, scene)
+    for name in (WALL_DAMPING, LOW_PASS):
+        scene = uncontrolled(scene).get(name, scene)
     return faster(scene)
 
 
@@ -88,12 +102,10 @@ def _watched(end: End, scene: Scene) -> Finding:
 
 def _does(changed: Finding, as_is: Finding) -> str:
     """Returns what a changed loop does, compared with the swing of the loop as it is."""
-    does = DOES.get(changed.word, "undecided")
-    if does == "swings on" and as_is.why == "leaves the limit" and changed.word == "limit-cycle":
-        return LESS
-    if does != "swings on" or not as_is.frequency_Hz or not changed.frequency_Hz:
+    does, is_other = DOES.get(changed.word, "undecided"), _is_other(changed, as_is)
+    if does != "swings on" or changed.word != "limit-cycle":
         return does
-    if as_is.word == changed.word == "limit-cycle" and changed.width_m < _LESS * as_is.width_m:
+    least = _FAR_LESS if is_other else _LESS
+    if as_is.why == _LEAVES or (as_is.word == "limit-cycle" and changed.width_m < least * as_is.width_m):
         return LESS
-    is_other = not 1.0 / _OTHER < changed.frequency_Hz / as_is.frequency_Hz < _OTHER
     return OTHERWISE if is_other else does

@@ -36,13 +36,14 @@ _DOES = {
 _ALL = {"all": "all of these at once"}
 _SEVERAL = "{} together: taking out any one of them is enough"
 _MOSTLY = "mostly {}"
+_ANY = "{}, either of which makes most of it"
 _NO_SINGLE_ONE = "no single part, since it swings without any one of them"
-_NOT_FOUND = "not found by these trials; what they leave is the wall itself, the hand, and the filters of the estimates"
+_NOT_FOUND = "not found by these trials; what they leave is the wall itself, the hand, and the estimators"
 _UNTOLD = "not determined by these trials"
 # Below this share most of what is seen is the hand's motion, noise, or dies away.
 _HALF = 0.5
 _SMALL_SHARE = "of the {:.0%} of the oscillation that the loop sustains alone, "
-_TRIED = "{cause}. Started anew on the wall, the loop {trials}."
+_TRIED = "{cause}. Started anew on the wall and pushed once, the loop {trials}."
 _BY_BOOKS = "According to the books of the whole run"
 # The books of wall and elements are those of the commands, and the actuator has one of its own.
 _LIMITED = " That counts what was commanded: the actuator's limits kept {kept} of it back."
@@ -79,9 +80,9 @@ def _listed(names: Sequence[str], last: str) -> str:
 
 
 def _cause_by_trial(without: Mapping[str, str]) -> str:
-    for does, words in (("rests", "{}"), ("swings less", _MOSTLY)):
+    for does, one, several in (("rests", "{}", _SEVERAL), ("swings less", _MOSTLY, _ANY)):
         if parts := [name for name, did in without.items() if did == does and name != "all"]:
-            return (_SEVERAL if does == "rests" and len(parts) > 1 else words).format(_listed(parts, "and"))
+            return (several if len(parts) > 1 else one).format(_listed(parts, "and"))
     if "undecided" in without.values():
         return _UNTOLD
     return _NO_SINGLE_ONE if without.get("all") in ("rests", "swings less") else _NOT_FOUND
