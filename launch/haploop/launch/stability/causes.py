@@ -39,7 +39,7 @@ def with_causes(end: End, found: Finding) -> Finding:
     ``idealised`` and ``uncontrolled``) and at a higher control rate (``HOLD``). Where no element alone makes a
     difference, it is tried without all of them (``ELEMENTS``); where no single part makes it rest, without all at once
     (``ALL``). Nothing is told of a wall that does not hold the hand, nor if the loop as it is, from this start,
-    comes to another swing than in its run, to none, or stays within the limit that the run left.
+    comes to another swing than in its run, to none, or leaves the limit where the run did not, or the reverse.
 
     A swing less than a third as wide, or less than a tenth at another frequency, or one that lasts where the loop as it
     is leaves its limit, is less; one at a frequency 1.5 times off is another, which takes the place of the first.
@@ -70,9 +70,9 @@ def _start(end: End, found: Finding) -> Scene | None:
 
 def _is_alike(as_is: Finding, found: Finding) -> bool:
     """Tells whether a loop that was started anew swings as in its run."""
-    if DOES.get(as_is.word) != "swings on" or (found.word == "diverged" and as_is.why != _LEAVES):
+    if found.word != "growing" and (as_is.why == _LEAVES) != (found.word == "diverged"):
         return False
-    return as_is.why == _LEAVES or found.word == "diverged" or not _is_other(as_is, found)
+    return DOES.get(as_is.word) == "swings on" and not _is_other(as_is, found)
 
 
 def _is_other(one: Finding, other: Finding) -> bool:
