@@ -133,17 +133,19 @@ def test_an_observer_that_holds_the_run_and_is_silent_or_never_ready_is_taken_of
             ("logger", True, True, 0.0),
             ("mute", True, True, 10.0),
             ("slow", True, False, 29.0),
+            ("loading", True, False, 0.0),
             ("view", False, False, 0.0),
         ]
     ):
         node = Node(bytes([number]), role, 1, lossless, {}, 0.0)
         node.ready, node.heard, roster.nodes[node.identity] = ready, heard, node
     assert [node.role for node, _ in late_observers(roster, 14.0, 5.0)] == []
-    assert [node.role for node, _ in late_observers(roster, 16.0, 5.0)] == ["mute"]
+    assert [node.role for node, _ in late_observers(roster, 16.0, 5.0)] == ["mute"], "what still loads may take longer"
     late = late_observers(roster, 30.0, 5.0)
     assert [(node.role, why.partition(";")[0]) for node, why in late] == [
         ("mute", "Nothing was heard from you for 5 s"),
         ("slow", "You were not ready within 20 s"),
+        ("loading", "You were not ready within 20 s"),
     ]
     roster.discount_silence(20.0)
     assert late_observers(roster, 30.0, 5.0) == []

@@ -24,15 +24,17 @@ def late_observers(
         ended_at: wall time at which the run ended, s; None while it goes on.
     """
     late = []
+    start_s = max(deadline_s, START_DEADLINE_S)  # loading keeps a busy machine busy; the deadline is for what runs
     for node in roster.nodes.values():
         if node.is_own or not node.lossless:
             continue
-        if now - node.heard > deadline_s and node.tick <= roster.slowest():
+        if not node.ready:
+            if now - node.joined > start_s:
+                late.append((node, f"You were not ready within {start_s:g} s; {_WITHOUT_YOU}"))
+        elif now - node.heard > deadline_s and node.tick <= roster.slowest():
             late.append((node, f"Nothing was heard from you for {deadline_s:g} s; {_WITHOUT_YOU}"))
         elif ended_at is not None and now - max(node.moved, ended_at) > deadline_s:
             late.append((node, f"You took nothing for {deadline_s:g} s after the end; {_ENDS_WITHOUT_YOU}"))
-        elif not node.ready and now - node.joined > START_DEADLINE_S:
-            late.append((node, f"You were not ready within {START_DEADLINE_S:g} s; {_WITHOUT_YOU}"))
     return late
 
 
