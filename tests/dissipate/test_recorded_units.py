@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from haploop.launch.scene.units import name_and_unit
 from haploop.tools.dissipate.recording.samples import RecordingError
 from haploop.tools.dissipate.recording.text_recording import Layout
 from haploop.tools.dissipate.report import make_report, note_sentences
@@ -20,6 +21,8 @@ from helpers.shown import shown
     [
         ({"t (ms)": T * 1e3, "x (mm)": X * 1e3}, Layout()),
         ({"t [ms]": T * 1e3, "x [um]": X * 1e6}, Layout()),
+        ({"t_ms": T * 1e3, "Position_mm": X * 1e3}, Layout()),
+        ({"t_us": T * 1e6, "tip_x_um": X * 1e6}, Layout(position="tip_x_um")),
         ({"t": T * 1e3, "x": X * 1e3}, Layout(length="mm", time_unit="ms")),
         ({"t": T, "x": X / 2.87e-5}, Layout(length="2.87e-5")),
         ({"t (s)": T, "x (mm)": X}, Layout(length="m")),
@@ -30,6 +33,25 @@ def test_units_come_from_the_header_or_are_given(
 ) -> None:
     path = write(tmp_path / "units.csv", columns)
     assert true_J(path, layout) == pytest.approx(true_J(plain), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("head", "unit"),
+    [
+        ("v_mm/s", "mm/s"),
+        ("a_m/s^2", "m/s^2"),
+        ("F_mN", "mN"),
+        ("v_m_s", ""),
+        ("v_mm_s", ""),
+        ("x_mm_filtered", ""),
+        ("x_M", ""),
+        ("_m", ""),
+    ],
+)
+def test_a_unit_after_an_underscore_is_one_unless_it_is_the_end_of_a_quotient_or_of_another_name(
+    head: str, unit: str
+) -> None:
+    assert name_and_unit(head) == (head, unit)
 
 
 def test_recorded_rates_have_the_units_of_the_lengths(tmp_path: Path) -> None:

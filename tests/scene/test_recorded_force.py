@@ -45,6 +45,7 @@ def test_a_trace_has_a_file_or_samples_but_not_both(files):
     ("csv", "times", "forces"),
     [
         ("t (ms), F [mN]\n0,0\n500,-1500\n", (0.0, 0.5), (0.0, -1.5)),
+        ("t_ms,F_mN\n0,0\n500,-1500\n", (0.0, 0.5), (0.0, -1.5)),
         ("time,force (N)\n0,0\n500,-1500\n", (0.0, 500.0), (0.0, -1500.0)),
     ],
 )
@@ -52,7 +53,8 @@ def test_units_in_the_header_of_a_recorded_force_are_read(files, tmp_path, csv, 
     (tmp_path / "push.csv").write_text(csv)
     path = files(top=LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\n')
     assert load(path).hand == Hand(force=Trace(time=times, force=forces))
-    (tmp_path / "push.csv").write_text(csv.replace("F [mN]", "m (g)").replace("force (N)", "m (kg)"))
+    wrong = csv.replace("F [mN]", "m (g)").replace("F_mN", "m (g)").replace("force (N)", "m (kg)")
+    (tmp_path / "push.csv").write_text(wrong)
     [mistake] = file_mistakes(path)
     assert "Line 1, the header of time and force:" in mistake
     assert "is a mass; a force was expected" in mistake

@@ -30,7 +30,7 @@ _MISSING = ("", "-", "--", "na", "n/a", "none", "null")
 
 @dataclass(frozen=True)
 class Column:
-    """One column of a file: its index from 0, its name or number from 1, and its unit from the header's brackets."""
+    """One column of a file: its index from 0, its name or number from 1, and its unit from the header."""
 
     index: int
     name: str
@@ -105,8 +105,9 @@ class DelimitedFile:
         return next(iter(self.all_of(names)), None)
 
     def all_of(self, names: Sequence[str]) -> list[Column]:
-        """Returns the columns that have one of these names in any case, in the order of the names."""
-        return [column for name in names for column in self.columns if column.name.lower() == name]
+        """Returns the columns that have one of these names, in any case and with or without ``_unit``, in order."""
+        bare = {column: column.name.removesuffix(f"_{column.unit}").lower() for column in self.columns}
+        return [column for name in names for column in self.columns if name in (bare[column], column.name.lower())]
 
     def blocks(self, columns: Sequence[Column]) -> Iterator[tuple[Floats, Floats]]:
         """Yields the numbers of these columns, shape (rows, columns), and the line of each row, shape (rows,).

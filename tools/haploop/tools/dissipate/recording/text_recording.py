@@ -16,18 +16,16 @@ from haploop.tools.dissipate.recording.repeats import repeats
 from haploop.tools.dissipate.recording.samples import Floats, Notes, RecordingError, Samples
 from haploop.tools.dissipate.recording.stamps import ONE_MISSING, Flags, Stamps, is_late, stamps
 
+# Times without a unit are seconds under this name; under others only if they are not far apart.
+_SECONDS = "seconds"
 # Names of columns that are looked for where none is given.
-_TIMES = ("t", "time", "timestamp", "time_s", "t_s", "seconds")
-_POSITIONS = ("x", "position", "pos", "position_m", "x_m", "displacement")
+_TIMES = ("t", "time", "timestamp", _SECONDS)
+_POSITIONS = ("x", "position", "pos", "displacement")
 # Columns that may be a force, which is read only where it is asked for: its sign and its hold are not in the file.
-_FORCES = ("force", "force_n", "f_n", "f")
-# Times without a unit are seconds under these names; under others only if they are not far apart.
+_FORCES = ("force", "f")
 _SORT = "sort its rows by time."
 _TOO_FAST = "give the rate with --rate if samples came faster than their clock."
-_IN_SECONDS = ("time_s", "t_s", "seconds")
 _FAR_APART_S = 0.1
-# Positions without a unit are metres under these names.
-_IN_METRES = ("position_m", "x_m")
 # Periods between two samples above which there is a gap; relative deviation above which a period is uneven.
 _GAP, _UNEVEN = 1.5, 0.1
 # No quantity of a device is greater, in SI units.
@@ -91,7 +89,7 @@ class TextRecording:
         # The velocity needs one sample before, the acceleration two; what was recorded needs none.
         self._unknown = 2 - len(self.recorded)
         place = self._columns["position"]
-        self._in_metres = bool(layout.length or place.unit) or place.name.strip().lower() in _IN_METRES
+        self._in_metres = bool(layout.length or place.unit)
         self._reach_m = (np.inf, -np.inf)
 
     def _choose(self, file: DelimitedFile, layout: Layout) -> tuple[dict[str, Column], dict[str, float]]:
@@ -156,7 +154,7 @@ class TextRecording:
                 f"The times in column {self._columns['time'].name} of {self._file.path} do not increase; {advice}"
             )
         column, times = self._columns["time"], block[0]["time"]
-        has_unit = unit or column.unit or column.name.strip().lower() in _IN_SECONDS
+        has_unit = unit or column.unit or column.name.strip().lower() == _SECONDS
         if not has_unit and period_s >= _FAR_APART_S:
             raise RecordingError(
                 f"Are the times in column {column.name} of {self._file.path}, {times[0]:g}, {times[1]:g} and so on, "
