@@ -18,8 +18,8 @@ from helpers.scenes.sweep_files import PRESS, sweep_file, swept
 
 # Such scenes go into no array: so many take so long that something can be done to the sweep meanwhile.
 SLOW_PRESS = PRESS.replace("duration = 0.05", "duration = 0.3") + '[clock]\nintegrator = "rk4"\n'
-SLOW = '[axes]\n"wall.stiffness" = { from = 10, to = 480, step = 10 }\n'
-CELLS = 48
+SLOW = '[axes]\n"wall.stiffness" = { from = 10, to = 240, step = 10 }\n'
+CELLS = 24
 LIMIT_BYTES = 30_000
 
 
