@@ -17,8 +17,8 @@ from haploop.plant.counters import COUNTERS
 # What a finding has that no summary holds under this name.
 _NOT_TOLD = ("word", "detail")
 _WITHOUT = (
-    "what the loop does without this part: rests, swings less (than a third as wide), swings otherwise (at another "
-    "frequency), swings on, or undecided"
+    "what the loop does without this part: rests, swings within its limit (which it leaves otherwise), swings less "
+    "(than a third as wide), swings otherwise (at another frequency), swings on, or undecided"
 )
 
 

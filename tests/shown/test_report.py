@@ -115,6 +115,11 @@ def test_the_likely_cause_is_told_of_what_swings_alone(swap: dict[str, Any], ver
         ({"delay": "swings on", "friction": "swings on", "all": "swings on"}, "not found by these trials; what they"),
         ({"delay": "swings less", "friction": "swings on"}, "mostly delay."),
         ({"delay": "swings less", "friction": "rests"}, "friction."),
+        ({"delay": "swings within its limit", "friction": "swings on"}, "mostly delay."),
+        (
+            {"delay": "swings within its limit", "hold": "swings within its limit"},
+            "delay and hold together: taking out any one of them keeps it within its limit.",
+        ),
         ({"delay": "swings less", "hold": "swings less"}, "delay and hold, either of which makes most of it."),
         ({"delay": "rests", "element 0 (damping)": "swings otherwise"}, "delay."),
         ({"friction": "swings on"}, "not found by these trials; what they leave"),

@@ -17,7 +17,7 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 
 ALL, ELEMENTS = "all", "all elements"
-RESTS, LESS, OTHERWISE = "rests", "swings less", "swings otherwise"
+RESTS, WITHIN, LESS, OTHERWISE = "rests", "swings within its limit", "swings less", "swings otherwise"
 # A swing narrower than the first share of another is less, or than the second if it has another frequency, which is one
 # that differs by more than this factor.
 _LESS, _FAR_LESS, _OTHER = 1.0 / 3.0, 0.1, 1.5
@@ -41,15 +41,16 @@ def with_causes(end: End, found: Finding) -> Finding:
     (``ALL``). Nothing is told of a wall that does not hold the hand, nor if the loop as it is, from this start,
     comes to another swing than in its run, to none, or leaves the limit where the run did not, or the reverse.
 
-    A swing less than a third as wide, or less than a tenth at another frequency, or one that lasts where the loop as it
-    is leaves its limit, is less; one at a frequency 1.5 times off is another, which takes the place of the first.
+    A swing less than a third as wide, or less than a tenth at another frequency, is less (``LESS``), one that lasts
+    where the loop as it is leaves its limit is ``WITHIN`` it; one at a frequency 1.5 times off is another, which takes
+    the place of the first (``OTHERWISE``).
     """
     start = _start(end, found) if found.word in ("limit-cycle", "growing", "diverged") else None
     if start is None or not _is_alike(as_is := _watched(end, start), found):
         return found
     parts = idealised(start) | {HOLD: faster(start)} | (elements := uncontrolled(start))
     does = {name: _does(_watched(end, scene), as_is) for name, scene in parts.items()}
-    if len(start.dissipation) > 1 and not {RESTS, LESS} & {does[name] for name in elements}:
+    if len(start.dissipation) > 1 and not {RESTS, WITHIN, LESS} & {does[name] for name in elements}:
         does[ELEMENTS] = _does(_watched(end, replace(start, dissipation=())), as_is)
     if RESTS not in does.values():
         does[ALL] = _does(_watched(end, _without_all(start)), as_is)
@@ -105,7 +106,8 @@ def _does(changed: Finding, as_is: Finding) -> str:
     does, is_other = DOES.get(changed.word, "undecided"), _is_other(changed, as_is)
     if does != "swings on" or changed.word != "limit-cycle":
         return does
-    least = _FAR_LESS if is_other else _LESS
-    if as_is.why == _LEAVES or (as_is.word == "limit-cycle" and changed.width_m < least * as_is.width_m):
+    if as_is.why == _LEAVES:
+        return WITHIN
+    if as_is.word == "limit-cycle" and changed.width_m < (_FAR_LESS if is_other else _LESS) * as_is.width_m:
         return LESS
     return OTHERWISE if is_other else does

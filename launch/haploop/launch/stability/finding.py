@@ -73,8 +73,9 @@ class Finding:
         at_hardest: what it does there: rests, swings on, or undecided; None if not asked.
         without: for a loop that swings, what it does without each of its parts, by the part's name, such as
             ``friction``; at a higher control rate (``sampling and hold``) and without ``all`` of these if it swings
-            without any one of them: rests, swings less (than a third as wide), swings otherwise (at another frequency),
-            swings on, or undecided. None if not asked, or if it does not swing when started anew.
+            without any one of them: rests, swings within its limit (which the loop leaves otherwise), swings less (than
+            a third as wide), swings otherwise (at another frequency), swings on, or undecided. None if
+            not asked, or if it does not swing when started anew.
         settles_s: how long after the push it came within 5 % of where it rests; None if it does not.
         memory_drifts: whether the memory of an element still changes while the loop rests.
     """

@@ -28,6 +28,7 @@ _WALL = (
 # What a loop does without its parts, in the order in which it is told.
 _DOES = {
     "rests": "rests without {}",
+    "swings within its limit": "swings within its limit without {}",
     "swings less": "swings less than a third as wide without {}",
     "swings otherwise": "swings at another frequency without {}",
     "swings on": "swings on without {}",
@@ -37,6 +38,9 @@ _ALL = {"all": "all of these at once"}
 _SEVERAL = "{} together: taking out any one of them is enough"
 _MOSTLY = "mostly {}"
 _ANY = "{}, either of which makes most of it"
+_BOTH = "{} together: taking out any one of them keeps it within its limit"
+# Words for one part and for several, by what the loop does without it.
+_CAUSES = ("rests", "{}", _SEVERAL), ("swings within its limit", _MOSTLY, _BOTH), ("swings less", _MOSTLY, _ANY)
 _NO_SINGLE_ONE = "no single part, since it swings without any one of them"
 _NOT_FOUND = "not found by these trials; what they leave is the wall itself, the hand, and the estimators"
 _UNTOLD = "not determined by these trials"
@@ -80,12 +84,12 @@ def _listed(names: Sequence[str], last: str) -> str:
 
 
 def _cause_by_trial(without: Mapping[str, str]) -> str:
-    for does, one, several in (("rests", "{}", _SEVERAL), ("swings less", _MOSTLY, _ANY)):
+    for does, one, several in _CAUSES:
         if parts := [name for name, did in without.items() if did == does and name != "all"]:
             return (several if len(parts) > 1 else one).format(_listed(parts, "and"))
     if "undecided" in without.values():
         return _UNTOLD
-    return _NO_SINGLE_ONE if without.get("all") in ("rests", "swings less") else _NOT_FOUND
+    return _NO_SINGLE_ONE if without.get("all") in [does for does, *_ in _CAUSES] else _NOT_FOUND
 
 
 def cause(energy: Summary, when: str = "In all") -> str:
