@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from matplotlib.text import Text
 from rich.console import Console
 from typer.testing import CliRunner
 
+from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.loaded_scene import load
 from haploop.launch.runs.result import Result
 from haploop.launch.scene.bundled import bundled
+from haploop.launch.spec import write_scene
 from haploop.tools.cli.app import app
+from haploop.tools.demo.figure import make_figure
 from haploop.tools.demo.report import report
 from haploop.tools.demo.story import Part, Story
 from haploop.tools.figure import style
+from haploop.tools.figure.data import RunData
+from helpers.scenes.least import KINDS
+from helpers.shown import artists
 
 SCENE = load(bundled("scenes")["demo"]).scene
 
@@ -32,6 +40,14 @@ def part(verdict: str, swing_m: float = 2e-3, **leak: float) -> Part:
 def story(before: Part, after: Part) -> Story:
     data: Any = SimpleNamespace(scene=SCENE)
     return Story(data, 1.0, "damping of 5 N s/m", before, after)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> RunData:
+    out = tmp_path_factory.mktemp("demo")
+    run_in_process(replace(SCENE, duration=1.5), KINDS, out=out)
+    write_scene(SCENE, out)
+    return RunData.from_directory(out)
 
 
 def words(told: Story, columns: int = 80) -> str:
@@ -73,6 +89,24 @@ def test_the_demo_fits_into_80_columns_and_shows_hertz_and_newtons_of_either_sid
     assert max(map(len, told.splitlines())) <= 80
     assert [line.split()[1:] for line in told.splitlines() if line.startswith(" at ")] == [["31.0", "Hz", "–"]]
     assert "3.50 N" in told
+
+
+@pytest.mark.parametrize("parts", [0, 1, 8, 40])
+def test_no_word_above_the_demo_s_charts_covers_another_or_leaves_the_figure_however_much_there_is_to_tell(
+    parts: int, data: RunData
+) -> None:
+    before = part("limit-cycle", delay_J=-2e-3)
+    if parts:
+        before.summary["stability"]["without"] = {f"element {n} (passivity-controller)": "rests" for n in range(parts)}
+    figure = make_figure(replace(story(before, part("steady")), data=data))
+    figure.draw_without_rendering()
+    texts = [text for text in figure.findobj(Text) if text.get_text().strip() and text.get_visible()]
+    boxes = {text: text.get_window_extent() for text in texts}
+    (title,), (told,) = artists(figure, "title"), artists(figure, "words")
+    assert boxes[title].y0 > boxes[told].y1
+    assert all(box.y1 < boxes[told].y0 for text, box in boxes.items() if text not in (title, told))
+    assert boxes[told].x1 < figure.bbox.x1
+    assert boxes[title].y1 < figure.bbox.y1
 
 
 @pytest.mark.slow

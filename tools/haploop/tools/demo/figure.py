@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from textwrap import fill
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,12 +14,16 @@ from haploop.tools.figure.loops import force_position_loop
 from haploop.tools.figure.time import MM, energy_panel, force_panel, mark_events, position_panel
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # How much of either side is drawn as loops of force against penetration, s.
 _LOOPS_S = 0.1
-_LETTERS = 118
+# Width of the figure and height of its charts, in; letters in a line above them, and the sizes of title and lines.
+_WIDE_IN, _CHARTS_IN = 12.0, 6.9
+_LETTERS, _TITLE_IN, _LINE_IN, _MARGIN_IN = 150, 0.42, 0.2, 0.08
 _PENETRATION = "penetration (mm); the area is energy given away"
 
 
@@ -31,9 +35,11 @@ def draw(story: Story, target: Path) -> Path:
 def make_figure(story: Story) -> Figure:
     """Makes the picture: position, force and energy over time, and two loops; FigureError without matplotlib."""
     data = story.data
-    figure = style.empty_figure(12.0, 8.0)
-    header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(0.17, 1.0))[:, 0]
-    _draw_header(header, story)
+    words = [line for sentence in (story.why(), story.outcome()) for line in wrap(sentence, _LETTERS)]
+    header_in = _TITLE_IN + len(words) * _LINE_IN + 2.0 * _MARGIN_IN
+    figure = style.empty_figure(_WIDE_IN, header_in + _CHARTS_IN)
+    header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(header_in, _CHARTS_IN))[:, 0]
+    _draw_header(header, story.data.scene.title, words, header_in)
     grid = body.add_gridspec(6, 2, width_ratios=(1.8, 1.0))
     position, force, energy = (body.add_subplot(grid[row : row + 2, 0]) for row in (0, 2, 4))
     position_panel(position, data, data.span_s, "Position")
@@ -53,11 +59,11 @@ def make_figure(story: Story) -> Figure:
     return figure
 
 
-def _draw_header(header: Any, story: Story) -> None:
+def _draw_header(header: Any, title: str, words: Sequence[str], high_in: float) -> None:
     look = {"color": style.INK, "va": "top"}
-    header.text(0.01, 0.95, story.data.scene.title, fontsize=style.LARGE - 1, fontweight="bold", gid="title", **look)
-    words = "\n".join(fill(sentence, _LETTERS) for sentence in (story.why(), story.outcome()))
-    header.text(0.01, 0.64, words, fontsize=style.TEXT + 1.5, linespacing=1.35, gid="words", **look)
+    top, below = 1.0 - _MARGIN_IN / high_in, 1.0 - (_MARGIN_IN + _TITLE_IN) / high_in
+    header.text(0.01, top, title, fontsize=style.LARGE - 1, fontweight="bold", gid="title", **look)
+    header.text(0.01, below, "\n".join(words), fontsize=style.TEXT + 1.5, linespacing=1.35, gid="words", **look)
 
 
 def _name_parts(ax: Axes, story: Story) -> None:

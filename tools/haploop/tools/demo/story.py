@@ -60,7 +60,7 @@ class Part:
         """Returns name and value of everything to be compared."""
         return [
             ("verdict", self.verdict),
-            ("proviso", "; ".join(self.provisos) or "–"),
+            ("condition", "; ".join(self.provisos) or "–"),
             ("position swings by", amount(self.swing_m, "m")),
             ("force swings by", amount(self.force_swing_N, "N")),
             ("at", amount(self.frequency_Hz, "Hz")),
