@@ -165,6 +165,7 @@ def test_an_overlay_draws_every_run_with_its_name_and_what_differs(runs):
     assert "clock.control_rate 500 Hz" in told[3]
     assert not any("–" in label for label in labels(given, names)), "a key that a run has not is not told of it"
     assert labels(data(runs, "a", "a"), ["a", "a (2)"]) == ["a", "a (2)"], "nothing differs but the name"
+    assert labels(data(runs, "a", "again"), ["a", "again"])[1] == "again", "a title that is the name is not told twice"
     with_one, without = data(runs, "a", "bare")
     assert labels([with_one, without], ["a", "bare"]) == [
         "a: with unidirectional-inertia (mass 0.01 kg)",

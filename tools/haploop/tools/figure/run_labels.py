@@ -22,7 +22,7 @@ def labels(runs: Sequence[RunData], names: Sequence[str]) -> list[str]:
     found = []
     for place, (run, name) in enumerate(zip(runs, names, strict=True)):
         differs = _differs(run, place, runs, unlike) if unlike else ""
-        title = run.scene.title if is_titled else ""
+        title = run.scene.title if is_titled and run.scene.title != name else ""
         short = title if len(title) <= _MOST_LETTERS else f"{title[: _MOST_LETTERS - 2].rstrip()} …"
         behind = f"{short} ({differs})" if short and differs else title or differs
         found.append(f"{name}: {behind}" if behind else name)
