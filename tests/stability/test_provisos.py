@@ -6,20 +6,23 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.runs.loaded_scene import load
+from haploop.launch.scene.bundled import bundled
 from haploop.launch.stability import looks
 from haploop.launch.stability.decide import decide
 from haploop.launch.stability.finding import Finding
-from haploop.launch.stability.judge import judge
+from haploop.launch.stability.judge import judge, judge_scene
 from haploop.launch.stability.looks import LOOKS_S
-from haploop.launch.stability.swing import Swing
+from haploop.launch.stability.swing import Pushed, Swing, measure
 from haploop.protocol.scene.effects import Friction
 from helpers.runs.judged import ended, found
 from helpers.scenes import wild_loops
-from helpers.scenes.least import scene
+from helpers.scenes.least import KINDS, scene
 from helpers.scenes.pressed import pressed
 from helpers.scenes.unseen_loops import drawn
 
@@ -124,6 +127,32 @@ def test_what_grows_is_never_steady_however_little_it_grew_while_it_was_watched(
     assert decide(swing, last=False).word != "steady"
     still = swing._replace(changes=(0.0, 0.0))
     assert decide(still, last=False).word == "steady"
+
+
+@pytest.mark.parametrize("larger_rests", [True, False])
+def test_a_loop_that_rests_after_one_push_and_swings_on_after_the_other_is_undecided_at_its_frequency(larger_rests):
+    t = np.arange(4000) / 1000.0
+    swings, dies = 1e-3 * np.sin(2 * np.pi * 40.0 * t), 1e-3 * np.exp(-40.0 * t) * np.sin(2 * np.pi * 40.0 * t)
+    small, large = (swings, dies) if larger_rests else (dies, swings)
+    one = np.ones(1)
+    [swing] = measure(Pushed(small[None], large[None], large[None], one, 0 * one, one > 0, one > 0, one > 0), 1000.0)
+    found = decide(swing, last=True)
+    assert (found.word, found.tells) == ("undecided", True)
+    assert found.why == ("larger rests" if larger_rests else "smaller rests")
+    assert (found.frequency_Hz, found.width_m) == pytest.approx((40.0, 2e-3), rel=0.02)
+    assert "either may happen" in found.sentence()
+    tiny = [1e-3 * x[None] for x in (small, large, large)]
+    [unfelt] = measure(Pushed(*tiny, one, 1e-5 * one, one > 0, one > 0, one > 0), 1000.0)
+    assert decide(unfelt, last=True).word == "steady"
+
+
+@pytest.mark.slow
+def test_a_wall_of_ridges_that_the_smaller_push_alone_sets_swinging_is_not_called_too_slow_to_tell():
+    ridges = ["wall.kind='texture'", "wall.ridge_spacing=0.0005", "wall.ridge_force=0.5"]
+    sets = ["event=[]", "clock.round_trip_delay=0.001", "wall.stiffness=1000", *ridges]
+    finding = judge_scene(load(bundled("scenes")["demo"], sets).scene, KINDS)
+    assert (finding.word, finding.why) == ("undecided", "larger rests")
+    assert finding.frequency_Hz == pytest.approx(39.6, rel=0.02)
 
 
 def test_of_an_unfelt_swing_that_was_there_all_along_no_time_is_told_after_which_it_came(monkeypatch):

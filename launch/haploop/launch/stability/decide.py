@@ -33,7 +33,15 @@ _COUNTS = 10
 
 
 def decide(swing: Swing, *, last: bool) -> Finding:
-    """Returns the finding; ``undecided`` asks for a longer time unless this is the ``last`` look.
+    """Returns the finding, see ``_decided``; *undecided* if it rests after one push and swings on after the other."""
+    found = _decided(swing, last=last)
+    if swing.rests and found.word in ("limit-cycle", "growing"):
+        return replace(found, word="undecided", why=f"{swing.rests} rests")
+    return found
+
+
+def _decided(swing: Swing, *, last: bool) -> Finding:
+    """Returns the finding on copies alike; ``undecided`` asks for a longer time unless this is the ``last`` look.
 
     *steady*: the swing has died; or it dies or lasts, and no hand feels what is left of it; or at the last look both
     swings still decay alike, to a third within 100 s. *limit-cycle*: the swing forgets how hard it was pushed, yet

@@ -34,6 +34,8 @@ BESIDE = {
 }
 # Numbers that only a push gives.
 _OF_PUSH = ("push_N", "watched_s", "frequency_Hz", "width_m", "spread_m", "force_ripple_N")
+# Findings without a verdict that more time would not change.
+_TOLD = ("rests off the wall", "larger rests", "smaller rests")
 DOES = {"steady": "rests", "limit-cycle": "swings on", "growing": "swings on", "diverged": "swings on"}
 
 
@@ -110,7 +112,7 @@ class Finding:
     @property
     def tells(self) -> bool:
         """Tells whether watching for longer would show nothing else."""
-        return (self.word != "undecided" or self.why == "rests off the wall") and not self.memory_drifts
+        return (self.word != "undecided" or self.why in _TOLD) and not self.memory_drifts
 
     def after_blow(self, found: Finding) -> Finding:
         """Returns the finding with what was found after a harder push: undecided unless it rests then, too."""

@@ -27,6 +27,8 @@ _CREEP, _CREEP_M = 3.0, 20e-6
 _SETTLED = 0.05
 # Sizes whose ratio lies between these are the same; those of the pushes differ by a factor of ten.
 SAME = (0.7, 1.43)
+# Names of the copies after the smaller and the larger push, by number; -1 is none.
+_NAMES = ("smaller", "larger", "")
 
 
 class Pushed(NamedTuple):
@@ -71,6 +73,8 @@ class Swing(NamedTuple):
         times_felt: how strong the last quarter of either is, as a multiple of the least that is felt.
         settles_s: time after the larger push from which on the swing stays within 5 % of its travel, or within what
             remains; 0 if it did not move.
+        rests: which copy alone comes to rest while a hand feels the other's swing, ``larger`` or ``smaller``, after
+            the push of that name; "" where they go alike. The measures are then the other's.
     """
 
     watched_s: float
@@ -95,6 +99,7 @@ class Swing(NamedTuple):
     covers: bool
     times_felt: float
     settles_s: float
+    rests: str = ""
 
     def lasts(self, within: float) -> bool:
         """Tells whether both swings neither grow nor decay, as far as their scatter shows."""
@@ -111,12 +116,14 @@ class Swing(NamedTuple):
 def measure(pushed: Pushed, rate: float) -> list[Swing]:
     """Returns the measures of each loop, computed as if it were alone.
 
+    If only one of the two copies of a loop comes to rest and a hand feels the other's swing, the other is measured.
     Slow swings are measured in fewer, longer pieces, and those too slow for these from turn to turn. If a loop rests
     except for a slow swing that no hand feels and a fast one that a hand does feel, the fast one is measured.
 
     ``rate``: ticks a second.
     """
     ticks = pushed.large.shape[-1]
+    pushed, rests_alone = _of_swinging(pushed, rate)
     frequency = frequency_Hz(pushed.large[:, ticks // 2 :], rate)
     last = np.stack([pushed.small, pushed.large])[..., -ticks // 4 :]
     of_copies, most_Hz = most_felt(last, rate)
@@ -136,7 +143,24 @@ def measure(pushed: Pushed, rate: float) -> list[Swing]:
                 some = some._replace(small=above(some.small, rate), large=above(some.large, rate))
             rows = _measured(some, rate, frequency[places], times_felt[places], _FEW_PIECES if slow else _PIECES)
             found |= {place: Swing(ticks / rate, *row) for place, row in zip(places.tolist(), rows, strict=True)}
-    return [_by_turns(found[i], pushed.small[i], pushed.large[i], rate) for i in range(len(frequency))]
+    swings = [_by_turns(found[i], pushed.small[i], pushed.large[i], rate) for i in range(len(frequency))]
+    return [swing._replace(rests=_NAMES[copy]) for swing, copy in zip(swings, rests_alone.tolist(), strict=True)]
+
+
+def _of_swinging(pushed: Pushed, rate: float) -> tuple[Pushed, np.ndarray]:
+    """Returns the loops with a copy that alone comes to rest replaced by the other, and the number of that copy.
+
+    The numbers, shape (members,), are 0 for the copy after the smaller push, 1 for that after the larger, -1 for none.
+    """
+    last = np.stack([pushed.small, pushed.large])[..., -(pushed.large.shape[-1] // 4) :]
+    still = np.ptp(last, axis=-1) < REST_M
+    apart = still[0] != still[1]
+    if not apart.any():
+        return pushed, np.full(still.shape[1], -1)
+    apart &= most_felt(last, rate)[0].max(axis=0) >= 1.0
+    small = np.where((apart & still[0])[:, None], pushed.large, pushed.small)
+    large = np.where((apart & still[1])[:, None], pushed.small, pushed.large)
+    return pushed._replace(small=small, large=large), np.where(apart, np.where(still[1], 1, 0), -1)
 
 
 def _measured(

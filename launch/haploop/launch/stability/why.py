@@ -14,7 +14,7 @@ WHY = {
     "lasts": "After pushes of {push_N:.3g} N and of a tenth of it, swings of {width} peak to peak at "
     "{frequency_Hz:.3g} Hz lasted for {watched_s:g} s; the one that may change more grows or decays by no more than "
     "{most_1_s:.2g} 1/s (two standard errors).",
-    "decays": "Its swing of {width} peak to peak at {frequency_Hz:.3g} Hz still decays, by {rate_1_s:.3g} +- "
+    "decays": "Its swing of {width} peak to peak at {frequency_Hz:.3g} Hz still decays, changing by {rate_1_s:.3g} +- "
     "{error_1_s:.2g} 1/s, and nothing in the loop makes small swings differ from large ones.",
     "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",
     "leaves the limit": "Its swing grew until the device was beyond its limit.",
@@ -22,6 +22,10 @@ WHY = {
     "rested": "After a push of {push_N:.3g} N it came to rest.",
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
     "rests off the wall": "After a push of {push_N:.3g} N it came to rest off the wall.",
+    "larger rests": "After a push of {push_N:.3g} N it came to rest, but after one of a tenth of that it swings on, by "
+    "{width} peak to peak at {frequency_Hz:.3g} Hz: either may happen, depending on how it is touched.",
+    "smaller rests": "After a push of {push_N:.3g} N it swings on, by {width} peak to peak at {frequency_Hz:.3g} Hz, "
+    "but after one of a tenth of that it came to rest: either may happen, depending on how it is touched.",
     "too few": "It still moves, by {width} peak to peak in half of {watched_s:g} s: too slowly to tell how "
     "it will end; {run} might show it.",
     "too slow": "Of its swings of {width} peak to peak at {frequency_Hz:.3g} Hz, the steadier changes by "
