@@ -93,10 +93,34 @@ def test_a_run_that_was_not_judged_is_told_by_what_was_seen_also_by_a_summary_of
 
 
 @pytest.mark.parametrize(("verdict", "is_told"), [("steady", False), ("limit-cycle", True), ("growing", True)])
-def test_the_likely_cause_is_told_of_what_swings_alone(swap: dict[str, Any], verdict: str, is_told: bool) -> None:
+def test_without_trials_what_fed_a_swing_is_told_of_what_swings_alone_and_is_not_called_its_cause(
+    swap: dict[str, Any], verdict: str, is_told: bool
+) -> None:
     without_trials = {**swap, "verdict": verdict, "stability": swap["stability"] | {"without": None}}
     text = " ".join(shown(summary_table(without_trials)).split())
-    assert (f"Likely cause: {cause(swap['energy'])}" in text) == is_told
+    assert (cause(swap["energy"]) in text) == is_told
+    assert "Likely cause" not in text
+    hardly_fed = {**without_trials, "energy": swap["energy"] | {"moved_J": 1e6}}
+    assert cause(swap["energy"]) not in " ".join(shown(summary_table(hardly_fed)).split())
+
+
+def test_of_a_hand_that_presses_harder_than_the_wall_holds_no_energy_is_said_to_be_the_cause(
+    swap: dict[str, Any],
+) -> None:
+    pressed = {**swap, "verdict": "diverged", "stability": swap["stability"] | {"without": {}}}
+    text = " ".join(shown(summary_table(pressed)).split())
+    assert "Likely cause: the hand, which presses harder than" in text
+    assert "the wall gave the device" not in text
+
+
+def test_the_books_of_a_run_that_was_changed_in_its_last_window_do_not_stand_beside_its_cause(
+    swap: dict[str, Any],
+) -> None:
+    stability = swap["stability"] | {"without": {"delay": "rests"}}
+    for changed_s, stands in ((None, True), (2.9, False)):
+        window = swap["window"] | {"changed_s": changed_s}
+        of = {**swap, "verdict": "limit-cycle", "stability": stability, "window": window}
+        assert ("According to the books" in " ".join(shown(summary_table(of)).split())) == stands
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,14 @@ from haploop.launch.plan.idealised import DELAY, HOLD, faster, idealised, uncont
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.launch.stability.causes import with_causes
+from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.judge import judge, judge_scene
 from haploop.launch.stability.looks import LOOKS_S
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.render.cause import by_trial
 from helpers.runs.judged import ended
+from helpers.scenes.least import scene
 from helpers.scenes.wild_loops import drawn
 
 BARE = ["event=[]", "friction.kinetic=0", "dissipation=[]", "duration=0.8"]
@@ -129,6 +131,24 @@ def test_the_low_pass_that_makes_damping_useless_is_a_part() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("part", "sets"),
+    [
+        ("ridges of the wall", ["wall.kind='texture'", "wall.ridge_spacing=0.0005", "wall.ridge_force=1.0"]),
+        (
+            "lag of the accelerometer",
+            ["clock.round_trip_delay=0.001", "acceleration.source='accelerometer'", "accelerometer={delay=0.02}",
+             "dissipation=[{kind='bidirectional-inertia', mass=0.05}]"],
+        ),
+    ],
+)  # fmt: skip
+def test_ridges_and_a_late_accelerometer_are_parts_without_which_the_loop_rests(part: str, sets: list[str]) -> None:
+    scene = load("demo", ["event=[]", "wall.stiffness=1000", *sets])
+    assert tried(scene)[part] == "rests"
+    assert judge_scene(uncontrolled(scene)[part], registry()).word == "steady"
+
+
+@pytest.mark.slow
 def test_two_elements_that_hide_each_other_are_tried_without_both() -> None:
     pair = "dissipation=[{kind='damping', damping=40}, {kind='damping', damping=40}]"
     found = tried(demo("wall.stiffness=1000", pair))
@@ -147,10 +167,10 @@ def test_what_a_method_of_integration_makes_diverge_is_laid_to_it() -> None:
 
 
 @pytest.mark.slow
-def test_nothing_is_told_of_a_wall_that_gives_way_to_the_hand() -> None:
+def test_of_a_wall_that_gives_way_to_the_hand_no_part_is_tried() -> None:
     event = "event=[{at=0.5, set={'wall.stiffness'=0}}]"
     found = judge_scene(load("demo", ["hand.stiffness=0", "diverged_beyond=0.06", event]), registry(), causes=True)
-    assert (found.word, found.without) == ("diverged", None)
+    assert (found.word, found.without) == ("diverged", {})
 
 
 @pytest.mark.slow
@@ -174,6 +194,21 @@ def test_of_a_run_that_diverged_the_cause_is_told_too() -> None:
     assert summary["verdict"] == "diverged"
     assert summary["stability"]["without"][DELAY] == "rests"
     assert run_in_process(scene, registry())["stability"]["without"] is None
+
+
+@pytest.mark.slow
+def test_a_hand_that_presses_harder_than_wall_or_actuator_hold_is_the_cause_and_no_part_is_tried() -> None:
+    device = {"mass": 0.05, "damping": 1.0, "position": 0.0}
+
+    def pressed(force_N: float, stiffness: float, saturation: float) -> Finding:
+        hand = {"force": {"kind": "constant", "value": -force_N}}
+        wall, limits = {"position": -0.002, "stiffness": stiffness}, {"saturation": saturation}
+        made = scene(duration=1.0, device=device, hand=hand, wall=wall, actuator=limits, run={"verdict": "pushed"})
+        return judge_scene(made, registry(), causes=True)
+
+    soft, weak = pressed(25.0, 20.0, 1e3), pressed(1.5, 3000.0, 1.0)
+    assert [found.without for found in (soft, weak)] == [{}, {}]
+    assert pressed(1.5, 3000.0, 2.0).without != {}
 
 
 @pytest.mark.slow

@@ -246,7 +246,7 @@ class Logger:
         measures, books, changed_s = self._measured(), self.books.state, self._changed_s
         is_short = self.tick - self._first_tick < WINDOW_S * self.time.control_rate
         verdict = measures.verdict(None, UNTOLD["short"] if is_short else measures.untold(self.tick, "", changed_s))
-        figures = (measures if changed_s is None else measures.of_two_loops()).window.figures
+        figures = (measures if changed_s is None else measures.of_two_loops(changed_s)).window.figures
         return {
             "t_s": self.tick / self.time.control_rate,
             "verdict": verdict.word,

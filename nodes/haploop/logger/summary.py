@@ -115,7 +115,7 @@ def outcome(
     if verdict.word == NO_SWING and ran["duration_s"] < WINDOW_S:  # too short to see a swing
         verdict = verdict._replace(rule=f"{UNTOLD['short']} {verdict.rule}")
     if changed_s is not None:
-        measures = measures.of_two_loops()
+        measures = measures.of_two_loops(changed_s)
     return {
         "title": scene.title,
         "seed": scene.seed,

@@ -10,10 +10,16 @@ from haploop.protocol.scene.paths import value_at, with_value, with_values, with
 from haploop.protocol.scene.scene import Scene
 
 DELAY = "round-trip delay"
-WALL_DAMPING, LOW_PASS, HOLD = "wall damping", "low-pass of the estimates", "sampling and hold"
-_CUTOFFS = ("velocity.cutoff", "acceleration.cutoff")
-# What damps in a wall, of any kind.
-_OF_WALL = ("wall.damping", "wall.damping_factor")
+HOLD = "sampling and hold"
+# Parts by name: keys that are 0 without them.
+OF_TABLES = {
+    "low-pass of the estimates": ("velocity.cutoff", "acceleration.cutoff"),
+    "lag of the accelerometer": ("accelerometer.bandwidth", "accelerometer.delay"),
+    "wall damping": ("wall.damping", "wall.damping_factor"),
+    "ridges of the wall": ("wall.ridge_force",),
+}
+# Of these keys, those that are left out instead: 0 Hz lets nothing pass.
+_RATES = ("velocity.cutoff", "acceleration.cutoff", "accelerometer.bandwidth")
 # The control rate is raised by this.
 _FASTER = 10
 
@@ -38,18 +44,19 @@ def idealised(scene: Scene) -> dict[str, Scene]:
 def uncontrolled(scene: Scene) -> dict[str, Scene]:
     """Returns a resolved scene without each part of its controller but the wall's stiffness, by the part's name.
 
-    The parts are each dissipation element, the damping of the wall, and the low-pass filters of the estimates.
+    The parts are each dissipation element, and the low-pass filters of the estimates, the lag of the accelerometer,
+    the damping and the ridges of the wall (``OF_TABLES``).
     """
     elements = scene.dissipation
     found = {
         f"element {place} ({table.name})": replace(scene, dissipation=elements[:place] + elements[place + 1 :])
         for place, table in enumerate(elements)
     }
-    cutoffs = [key for key in _CUTOFFS if value_at(scene, key)]
-    if cutoffs:
-        found[LOW_PASS] = without(scene, *cutoffs)
-    damping = {key: 0.0 for key in _OF_WALL if value_at(scene, key)}
-    return found | ({WALL_DAMPING: with_values(scene, damping)} if damping else {})
+    for name, keys in OF_TABLES.items():
+        if given := [key for key in keys if value_at(scene, key)]:
+            rates = [key for key in given if key in _RATES]
+            found[name] = with_values(without(scene, *rates), {key: 0.0 for key in given if key not in rates})
+    return found
 
 
 def faster(scene: Scene) -> Scene:

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from haploop.controller.controller import Controller
-from haploop.launch.plan.idealised import HOLD, LOW_PASS, WALL_DAMPING, faster, idealised, uncontrolled
+from haploop.launch.plan.idealised import HOLD, OF_TABLES, faster, idealised, uncontrolled
 from haploop.launch.plan.rules import has_friction
 from haploop.launch.stability.finding import DOES, Finding
 from haploop.launch.stability.looks import LOOKS_S, push_of
@@ -39,14 +39,20 @@ def with_causes(end: End, found: Finding) -> Finding:
     ``idealised`` and ``uncontrolled``) and at a higher control rate (``HOLD``). Where no element alone makes a
     difference, it is tried without all of them (``ELEMENTS``); where no single part makes it rest, without all at once
     (``ALL``). Nothing is told of a wall that does not hold the hand, nor if the loop as it is, from this start,
-    comes to another swing than in its run, to none, or leaves the limit where the run did not, or the reverse.
+    comes to another swing than in its run, to none, or leaves the limit where the run did not, or the reverse. Of a
+    device that left its limit, nothing without its parts (``{}``) is told where the hand presses harder than the wall
+    answers within the limit, or than the actuator can.
 
     A swing less than a third as wide, or less than a tenth at another frequency, is less (``LESS``), one that lasts
     where the loop as it is leaves its limit is ``WITHIN`` it; one at a frequency 1.5 times off is another, which takes
     the place of the first (``OTHERWISE``).
     """
-    start = _start(end, found) if found.word in ("limit-cycle", "growing", "diverged") else None
-    if start is None or not _is_alike(as_is := _watched(end, start), found):
+    if found.word not in ("limit-cycle", "growing", "diverged") or not end.controller.params.wall.inward:
+        return found
+    start = _start(end, found)
+    if start is None:
+        return replace(found, without={}) if found.word == "diverged" or found.why == _LEAVES else found
+    if not _is_alike(as_is := _watched(end, start), found):
         return found
     parts = idealised(start) | {HOLD: faster(start)} | (elements := uncontrolled(start))
     does = {name: _does(_watched(end, scene), as_is) for name, scene in parts.items()}
@@ -58,10 +64,13 @@ def with_causes(end: End, found: Finding) -> Finding:
 
 
 def _start(end: End, found: Finding) -> Scene | None:
-    """Returns the scene that the trials begin with; None if the wall does not hold the hand."""
+    """Returns the scene that the trials begin with; None if wall and actuator do not hold the hand within the limit."""
     scene, wall = end.scene, end.controller.params.wall
     press_N = abs(press_of(end.hold_N, scene.hand, wall.position))
-    if not wall.inward or wall.held(depth_m := depth_of(wall, press_N)) < _HOLDS * press_N:
+    most_N = (scene.actuator and scene.actuator.saturation) or math.inf
+    if wall.held(depth_m := depth_of(wall, press_N)) < _HOLDS * press_N or most_N < press_N:
+        return None
+    if abs(wall.position + wall.inward * depth_m) > scene.diverged_beyond:
         return None
     v_m_s = wall.inward * min(math.pi * found.frequency_Hz * found.width_m, _FASTEST_M_S)
     device = replace(scene.device, position=float(wall.position + wall.inward * depth_m), velocity=v_m_s)
@@ -87,7 +96,7 @@ def _without_all(scene: Scene) -> Scene:
     for name in idealised(scene):
         scene = idealised(scene)[name]
     scene = replace(scene, dissipation=())
-    for name in (WALL_DAMPING, LOW_PASS):
+    for name in OF_TABLES:
         scene = uncontrolled(scene).get(name, scene)
     return faster(scene)
 

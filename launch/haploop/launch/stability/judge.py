@@ -152,7 +152,10 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
         return summary
     window = summary["window"]
     beside = moved_beside(scene, window["from_s"])
-    summary = finite(summary | finding.entries(window["oscillation_m"], beside, window.get("force_ripple_N")))
+    # What a window shows of a loop that was changed within it is not the loop that was judged.
+    shown = "oscillation_m", "force_ripple_N"
+    seen_m, ripple_N = (window.get(name) if window.get("changed_s") is None else None for name in shown)
+    summary = finite(summary | finding.entries(seen_m, beside, ripple_N))
     if out:
         write_summary(summary, out)
     return summary

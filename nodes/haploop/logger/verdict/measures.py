@@ -55,6 +55,7 @@ class Figures(NamedTuple):
         penetration_mean_m: mean penetration of the measured position at the ticks in contact; None without such ticks.
         force_ripple_N: swing of the commanded force above 30 Hz, peak to peak.
         force_swing_N: swing of the commanded force, peak to peak.
+        changed_s: when the loop was last changed within the window, so that it shows two loops; None if it was not.
     """
 
     from_s: float
@@ -66,6 +67,7 @@ class Figures(NamedTuple):
     penetration_mean_m: float | None
     force_ripple_N: float
     force_swing_N: float
+    changed_s: float | None = None
 
 
 class WindowMeasures(NamedTuple):
@@ -161,9 +163,9 @@ class RunMeasures(NamedTuple):
             return ""
         return UNTOLD["changed"].format(at_s=changed_s, from_s=self.window.figures.from_s)
 
-    def of_two_loops(self) -> RunMeasures:
+    def of_two_loops(self, changed_s: float) -> RunMeasures:
         """Returns the measures for a window in which the loop was changed: it displayed more than one stiffness."""
-        figures = self.window.figures._replace(displayed_stiffness_N_m=None)
+        figures = self.window.figures._replace(displayed_stiffness_N_m=None, changed_s=changed_s)
         return self._replace(window=self.window._replace(figures=figures))
 
 

@@ -46,6 +46,12 @@ _NOT_FOUND = "not found by these trials; what they leave is the wall itself, the
 _UNTOLD = "not determined by these trials"
 # Below this share most of what is seen is the hand's motion, noise, or dies away.
 _HALF = 0.5
+# Share of the energy that moved in a run from which on what the wall gave away is told without trials.
+_TELLING = 0.01
+_LIKELY = "Likely cause: {}"
+_PRESSED_THROUGH = (
+    "the hand, which presses harder than the wall answers within the device's limit, or than the actuator can."
+)
 _SMALL_SHARE = "of the {:.0%} of the oscillation that the loop sustains alone, "
 _TRIED = "{cause}. Started anew on the wall and pushed once, the loop {trials}."
 _BY_BOOKS = "According to the books of the whole run"
@@ -59,15 +65,29 @@ def likely_cause(summary: Summary) -> str:
     """Returns the likely cause of a swing, given the summary of its run; "" where nothing is known of it.
 
     Where the loop was tried without its parts, it is the part without which it rests, followed by the trials. The
-    energy by the books, ``cause``, comes after it: one part may feed a swing that rests without another.
+    energy by the books, ``cause``, comes after it: one part may feed a swing that rests without another. It is left out
+    of a run that was changed within its last window, since the books are of all its loops, and of one whose wall fed
+    nothing, such as when its first force came after the end. Without trials it stands alone, unless it is less than a
+    hundredth of what moved.
     """
-    stability = summary.get("stability", {})
-    tried = by_trial(stability.get("without"))
-    share = stability.get("own_share")
+    stability, energy = summary.get("stability", {}), summary["energy"]
+    without, share = stability.get("without"), stability.get("own_share")
+    if without == {}:
+        return _LIKELY.format(_PRESSED_THROUGH)
+    tried = by_trial(without)
     if tried and share is not None and share < _HALF:
         tried = _SMALL_SHARE.format(share) + tried
-    books = cause(summary["energy"], _BY_BOOKS) if tried else cause(summary["energy"])
-    return f"{tried} {books}".strip()
+    if tried:
+        is_of_this_loop = summary["window"].get("changed_s") is None and energy["wall"].get("true_J") != 0.0
+        fed = is_of_this_loop and _most_fed_J(energy) > 0.0
+        return " ".join([_LIKELY.format(tried), *([cause(energy, _BY_BOOKS)] if fed else [])]).strip()
+    return "" if 0.0 < _most_fed_J(energy) < _TELLING * (energy.get("moved_J") or 0.0) else cause(energy)
+
+
+def _most_fed_J(energy: Summary) -> float:
+    """Returns the most that the wall, or an element, gave the device more than an ideal one, J."""
+    leak_J = (energy["wall"].get("leak") or {}).get("total_J") or 0.0
+    return max([-leak_J, *(-(element["true_J"] or 0.0) for element in energy["elements"])])
 
 
 def by_trial(without: Mapping[str, str] | None) -> str:

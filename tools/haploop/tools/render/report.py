@@ -87,7 +87,7 @@ def summary_table(summary: Summary, notes: Sequence[Note] = ()) -> RenderableTyp
     rule = rule.rstrip(".")
     parts: list[RenderableType] = [head, Text(f"{rule[:1].upper()}{rule[1:]}.", style="dim")]
     if summary["verdict"] in SWINGS and (why := likely_cause(summary)):
-        parts.append(Text(f"Likely cause: {why}"))
+        parts.append(Text(why))
     if summary["verdict"] == "no-contact":
         parts += [Text(note) for note in notes if note.keeps_off]
     if summary["ended"] not in ("done", "diverged"):
