@@ -80,6 +80,24 @@ def test_a_force_that_ripples_by_a_tenth_of_the_hold_or_of_a_newton_is_told_besi
         assert said == ["its force ripples"] * (is_said and word == "steady")
 
 
+@pytest.mark.parametrize(
+    ("why", "felt", "is_said"), [("decays", True, True), ("decays", False, False), ("rest", True, False)]
+)
+def test_a_swing_that_is_still_felt_when_it_was_last_looked_at_is_told_beside_steady(why, felt, is_said):
+    found = Finding("steady", why, 0.3, 16.0, -0.05, 0.001, 12.0, 5e-3, felt=felt, settles_s=1.0)
+    assert found.entries()["stability"]["provisos"] == ["its swing dies slowly"] * is_said
+    assert ("changing by -0.05 +- 0.001 1/s" in found.sentence()) == (why == "decays")
+
+
+@pytest.mark.slow
+def test_what_a_window_shows_of_a_loop_that_was_changed_within_it_is_no_proviso_of_the_loop_judged():
+    for at_s, changed_s in ((1.99, 1.99), (0.5, None)):
+        event = f"event=[{{at={at_s}, set={{'wall.stiffness'=100}}}}]"
+        summary = run_in_process(load(bundled("scenes")["demo"], [event]).scene, registry())
+        assert summary["window"]["changed_s"] == changed_s
+        assert (summary["verdict"], summary["stability"]["provisos"]) == ("steady", [])
+
+
 @pytest.mark.slow
 def test_a_loop_without_friction_that_noise_moves_by_as_much_as_a_hand_feels_says_so_beside_the_word():
     """0.1 kg, 2 N s/m, 2 N/mm, held by 5 N: at rest without the noise of 30 µm, which moves it by 60 µm."""
