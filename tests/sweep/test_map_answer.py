@@ -76,6 +76,15 @@ def test_what_a_steady_verdict_rests_on_is_told_with_the_answer_and_counted() ->
     assert "Condition: only friction holds it." in told
     assert "Conditions of the steady runs: only friction holds it (2)." in told
     assert "No run was pushed" not in told
+    assert "Every run has the hand and the hold of its scene; haploop advise tries others." in told
+    assert "was not recorded" not in told
+
+
+def test_of_a_table_without_what_its_verdicts_rest_on_the_map_says_so() -> None:
+    data = table({K: STIFFNESSES}, cells_of({K: STIFFNESSES}), [said("steady")] * 4, [None] * 4)
+    columns = {name: column for name, column in data.columns.items() if name != "stability.provisos"}
+    told = legend(make_figure(dataclasses.replace(data, columns=columns)))
+    assert "What the steady runs rest on was not recorded." in told
 
 
 @pytest.mark.slow

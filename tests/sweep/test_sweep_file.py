@@ -298,6 +298,8 @@ def test_what_a_verdict_rests_on_is_recorded_as_text_unless_the_verdict_is_the_c
     axes = '[axes]\n"wall.stiffness" = [100, 200]\n'
     pushed = loaded(tmp_path, '[set]\n"run.verdict" = "pushed"\n' + axes)
     assert pushed.record[-1] == Column("stability.provisos", "string")
+    named = loaded(tmp_path, 'record = ["window.oscillation_m"]\n[set]\n"run.verdict" = "pushed"\n' + axes)
+    assert [column.name for column in named.record] == ["verdict", "window.oscillation_m", "stability.provisos"]
     row = pushed.row(0, None, {"ended": "done", "verdict": "steady", "stability": {"provisos": ["a", "b"]}})
     assert row["stability.provisos"] == "a; b"
     cheap = loaded(tmp_path, '[set]\n"run.verdict" = "window"\n' + axes)
@@ -308,7 +310,7 @@ def test_what_two_ticks_of_a_run_do_not_tell_is_recorded_as_it_is_declared(tmp_p
     record = 'record = ["stability.blown", "stability.chaotic", "stability.rate_1_s"]\n'
     axes = '[axes]\n"wall.stiffness" = [100, 200]\n[set]\n"run.verdict" = "pushed"\n'
     made = loaded(tmp_path, record + axes)
-    assert [column.kind for column in made.record] == ["string", "string", "bool", "float64"]
+    assert [column.kind for column in made.record] == ["string", "string", "bool", "float64", "string"]
     row = made.row(0, None, {"ended": "done", "verdict": "steady", "stability": {"blown": "rests", "chaotic": None}})
     assert (row["stability.blown"], row["stability.chaotic"]) == ("rests", None)
 

@@ -32,13 +32,17 @@ Complain = Callable[[int, str, str | None], None]
 
 def usual(base: Scene) -> list[str]:
     """Returns the keys that are recorded unless others are asked for."""
-    return [*_USUAL, *(["stability.width_m", PROVISOS] if base.run.verdict == "pushed" else [])]
+    return [*_USUAL, *(["stability.width_m"] if _is_pushed(base) else [])]
+
+
+def _is_pushed(scene: Scene) -> bool:
+    return scene.run.verdict == "pushed"
 
 
 def make_columns(
     names: Sequence[str], sweep: Sweep, kinds: Mapping[str, type[Element]], complain: Complain
 ) -> list[Column]:
-    """Makes a column for each key; the verdict is always among them.
+    """Makes a column for each key; the verdict is always among them, and what it rests on.
 
     Args:
         sweep: what will be run; the first and the last of its cells that can be run are sampled.
@@ -56,7 +60,7 @@ def make_columns(
             complain(place, f"It is a table; name one of {', '.join(inner[:8])}.", None)
         else:
             complain(place, "It must be a dotted key of a run's summary.", nearest(name, known))
-    wanted = dict.fromkeys([VERDICT, *names])
+    wanted = dict.fromkeys([VERDICT, *names, *([PROVISOS] if _is_pushed(sweep.base) else [])])
     return [Column(name, _kind(name, known.get(name)), unit_of(name)) for name in wanted if name not in (ENDED, WHY)]
 
 

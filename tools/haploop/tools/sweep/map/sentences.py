@@ -13,6 +13,7 @@ from haploop.tools.sweep.map.axis import Axis, short
 from haploop.tools.sweep.map.data import NOT_RUN, STIFFNESS, WIDTH, Cells, Layout, MapData, Verdict
 from haploop.tools.sweep.map.edges import Answer, Edges, State, stiffest_steady
 from haploop.tools.sweep.map.lines import PanelLines
+from haploop.tools.sweep.table import PROVISOS
 
 # Letters that fit into the line below the title; the base scene's title is cut before anything else is.
 _BETWEEN, _LETTERS, _LEAST_LETTERS = "   ·   ", 185, 12
@@ -26,6 +27,7 @@ _STIFFEST = (
     ("Stiffest steady wall", "Every softer wall tried there is steady, too."),
     ("Stiffest wall on which no swing was seen", "None was seen on any softer wall tried there, either."),
 )
+_ONE_HOLD = "Every run has the hand and the hold of its scene; haploop advise tries others."
 _UNPUSHED = "No run was pushed: the words describe its last half second, and say little about stability."
 
 
@@ -84,7 +86,10 @@ def _answer(data: MapData, cells: Cells) -> str:
 
 
 def _provisos(data: MapData) -> str:
-    """Returns how many steady runs rest on each proviso."""
+    """Returns how many steady runs rest on each proviso, or that this is not known."""
+    if PROVISOS not in data.columns:
+        is_missing = Verdict.STEADY in data.verdicts and not data.is_unpushed
+        return "What the steady runs rest on was not recorded." if is_missing else ""
     counts = Counter(
         proviso for row in np.flatnonzero(data.verdicts == Verdict.STEADY).tolist() for proviso in data.provisos(row)
     )
@@ -119,6 +124,7 @@ def map_notes(data: MapData, cells: Cells, layout: Layout, lines: Sequence[Panel
         _answer(data, cells): True,
         _provisos(data): True,
         _UNPUSHED: data.is_unpushed,
+        _ONE_HOLD: Verdict.STEADY in data.verdicts,
         f"The first {len(lines)} of {panels} panels are drawn.": panels > len(lines),
         f"No exact limit{some}, since the loop is not linear: {reasons}.": reasons,
         f"Outside the {where}: {outside}.": outside,
@@ -149,6 +155,7 @@ def edge_notes(data: MapData, edges: Edges, best: Answer | None, lines: Sequence
         f"{edges.more} of {len(data.boundary['low'])} searches changed more than once.": edges.more,
         _provisos(data): True,
         _UNPUSHED: data.is_unpushed,
+        _ONE_HOLD: Verdict.STEADY in data.verdicts,
         f"No exact limit, since the loop is not linear: {reasons}.": reasons,
         _failures(data): True,
     })  # fmt: skip
