@@ -81,6 +81,18 @@ def test_a_force_that_ripples_by_a_tenth_of_the_hold_or_of_a_newton_is_told_besi
 
 
 @pytest.mark.parametrize(
+    ("free", "told"),
+    [(Finding("limit-cycle", "lasts", width_m=1.2e-5), "a swing of 0.012 mm peak to peak would last."),
+     (Finding("growing", "grows", width_m=1.0), "its swing would grow."),
+     (Finding("steady", "rest"), "Held like this, it would also rest without its friction.")],
+)  # fmt: skip
+def test_a_small_swing_by_counts_is_told_from_a_growing_one_of_a_loop_that_friction_holds(free, told):
+    found = Finding("steady", "rest", 0.3, 1.0, settles_s=0.1).without_friction(free)
+    assert found.sentence().endswith(told)
+    assert found.frictionless_m == (free.width_m if free.word == "limit-cycle" else None)
+
+
+@pytest.mark.parametrize(
     ("why", "felt", "is_said"), [("decays", True, True), ("decays", False, False), ("rest", True, False)]
 )
 def test_a_swing_that_is_still_felt_when_it_was_last_looked_at_is_told_beside_steady(why, felt, is_said):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from haploop.launch.stability.swing import REST_M
-from haploop.launch.stability.why import AFTER_BLOW, AT_HARDEST, DECAYING, DEEPER, FRICTIONLESS, WHY
+from haploop.launch.stability.why import AFTER_BLOW, AT_HARDEST, DECAYING, DEEPER, FRICTIONLESS, GROWS, LASTS, WHY
 from haploop.logger.verdict.measures import WINDOW_S
 
 # Swings of the loop and of its run whose widths differ by more than this factor are not the same.
@@ -67,6 +67,7 @@ class Finding:
         blown: what it does after these: rests, rests off the wall, swings on, or undecided; None if not asked.
         frictionless: what a loop that also rests after these would do after the push without its friction: rests,
             swings on, swings on a part of a count deeper, or undecided; None if not asked, or if it has no friction.
+        frictionless_m: how wide the swing that lasts then is, peak to peak; None if none does, or if it grows.
         deeper_N: for a loop without friction that rests, how much harder the hand holds it where it lies a part of an
             encoder's count deeper; None if not asked, or without counts.
         deeper: what it does there: rests, swings on, or undecided; None if not asked.
@@ -100,6 +101,7 @@ class Finding:
     blow_N: float | None = None
     blown: str | None = None
     frictionless: str | None = None
+    frictionless_m: float | None = None
     hardest_N: float | None = None
     at_hardest: str | None = None
     deeper_N: float | None = None
@@ -141,14 +143,16 @@ class Finding:
         """
         does = DOES.get(found.word, "undecided")
         if self.frictionless:
-            return replace(self, frictionless=f"{does} a part of a count deeper" if does == "swings on" else does)
+            does = f"{does} a part of a count deeper" if does == "swings on" else does
+            return replace(self, frictionless=does, frictionless_m=_lasting_m(found))
         drift = self.memory_drifts or found.memory_drifts
         told = replace(self, deeper_N=abs(more_N), deeper=does, memory_drifts=drift)
         return told if does == "rests" else replace(told, word="undecided", why="rested")
 
     def without_friction(self, found: Finding) -> Finding:
         """Returns the finding with what was found after the same push of the loop without its friction."""
-        return replace(self, frictionless=DOES.get(found.word, "undecided"))
+        does = DOES.get(found.word, "undecided")
+        return replace(self, frictionless=does, frictionless_m=_lasting_m(found))
 
     def entries(
         self, seen_m: float | None = None, beside: Sequence[str] = (), ripple_N: float | None = None
@@ -213,12 +217,21 @@ class Finding:
     def sentence(self) -> str:
         """Returns the reason for the verdict, a sentence with its numbers."""
         numbers = {name: math.nan if value is None else value for name, value in vars(self).items()}
-        width_um = 1e6 * self.width_m
-        width = f"{1e-3 * width_um:.3g} mm" if width_um >= _FINE_UM else f"{width_um:.3g} µm"
+        width_um, width = 1e6 * self.width_m, _in_words(self.width_m)
         about_s = float(f"{numbers['needs_s']:.2g}")
         run = f"watching for about {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
         sentence = WHY[self.why].format(**numbers, width=width, width_um=width_um, run=run, decaying=self._decaying())
         sentence += AFTER_BLOW[self.blown].format(**numbers) if self.blown else ""
         sentence += AT_HARDEST[self.at_hardest].format(**numbers) if self.at_hardest else ""
         sentence += DEEPER[self.deeper].format(**numbers) if self.deeper else ""
-        return sentence + (FRICTIONLESS[self.frictionless] if self.frictionless else "")
+        lasts = LASTS.format(_in_words(self.frictionless_m)) if self.frictionless_m else GROWS
+        return sentence + (FRICTIONLESS[self.frictionless].format(lasts) if self.frictionless else "")
+
+
+def _lasting_m(found: Finding) -> float | None:
+    """Returns the width of a swing that lasts, m; None for any other."""
+    return found.width_m if found.word == "limit-cycle" else None
+
+
+def _in_words(width_m: float) -> str:
+    return f"{1e3 * width_m:.3g} mm" if 1e6 * width_m >= _FINE_UM else f"{1e6 * width_m:.3g} µm"

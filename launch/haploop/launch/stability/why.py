@@ -53,10 +53,11 @@ DEEPER = {
     "undecided": " Whether it also does so when held {deeper_N:.2g} N harder, a part of an encoder's count deeper, "
     "could not be determined.",
 }
+LASTS, GROWS = "a swing of {} peak to peak would last", "its swing would grow"
 FRICTIONLESS = {
     "rests": " Held like this, it would also rest without its friction.",
-    "swings on": " Only friction holds it: without it, its swing would last or grow.",
+    "swings on": " Only friction holds it: without it, {}.",
     "swings on a part of a count deeper": " Only friction holds it: without it, and held a part of an encoder's count "
-    "deeper, its swing would last or grow.",
+    "deeper, {}.",
     "undecided": " Whether it would rest without its friction could not be determined.",
 }
