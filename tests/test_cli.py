@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from importlib.metadata import version
@@ -12,6 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from haploop.tools.cli.app import app
+from helpers.live.launched import HAPLOOP
 
 SCENES = Path(__file__).parents[1] / "launch" / "scenes"
 FIG6C = str(SCENES / "fig6c.toml")
@@ -199,3 +201,22 @@ def test_mistakes_are_told_as_json_too(tmp_path):
     assert told.exit_code == 2
     assert any("did you mean stiffness?" in mistake for mistake in mistakes)
     assert all(mistake in told.stderr for mistake in mistakes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "ascii"])
+def test_a_terminal_that_has_not_every_letter_gets_the_report_all_the_same(encoding: str, tmp_path: Path) -> None:
+    words = ["run", "fig6c", "--set", "duration=0.1", "--in-process", "--out", str(tmp_path / "out")]
+    done = subprocess.run(
+        [*HAPLOOP, *words], capture_output=True, env={**os.environ, "PYTHONIOENCODING": encoding}, check=False
+    )
+    assert (done.returncode, b"Traceback" in done.stderr) == (0, False), done.stderr
+    assert done.stdout.decode(encoding).splitlines()[-1] == str(tmp_path / "out")
+
+
+def test_a_name_that_would_steer_the_terminal_is_refused() -> None:
+    done = CliRunner().invoke(app, ["check", "fig6c", "--set", "title=a\x1b[31mred"])
+    assert done.exit_code == 2
+    assert "title is" in done.stderr
+    assert "It must be one line of letters that can be printed." in done.stderr
+    assert "\x1b" not in done.stderr

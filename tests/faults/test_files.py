@@ -76,7 +76,7 @@ def test_a_file_where_the_directory_should_be_is_refused(launched, tmp_path):
     out.write_text("a file")
     run = launched("run", str(SCENE), out=out)
     run.end(2)
-    assert f"The run's directory {out} cannot be made" in run.stderr
+    assert f"The directory {out} cannot be made" in run.stderr
     assert out.read_text() == "a file"
 
 

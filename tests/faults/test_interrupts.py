@@ -1,15 +1,18 @@
 """Ctrl-C and SIGTERM: the first ends a run in order, with a summary of what ran; the second at once."""
 
+import contextlib
 import json
+import os
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
 import haploop.logger
 from haploop.launch.runs.replay import replay
-from helpers.live.launched import AT_REST, SCENE, first_and_slowly, same_bits, wait_for
+from helpers.live.launched import AT_REST, HAPLOOP, PATIENCE_S, SCENE, first_and_slowly, processes, same_bits, wait_for
 
 SIGNALS = first_and_slowly(signal.SIGINT, signal.SIGTERM)
 
@@ -131,3 +134,25 @@ def test_ctrl_c_before_a_command_has_begun_is_a_sentence(moment):
     start = "import builtins, signal\nfrom haploop.tools.cli.main import LeavingAtOnce, main\n"
     done = subprocess.run([sys.executable, "-c", f"{start}{moment}main()"], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (1, "", "Interrupted before anything began.\n")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wait_s", [0.0, 0.2, 0.5, 1.0])
+def test_ctrl_c_twice_within_ten_milliseconds_shows_no_traceback_and_ends_the_run(wait_s, tmp_path):
+    """Whatever the command is at on this machine: once it has started its first process, it loads, or runs.
+
+    The two may arrive as one, which stops a run in order. Python itself ends with the signal's status, whatever is
+    asked of it, where one came while a dataclass was made.
+    """
+    words = ["run", str(SCENE), "--set", "duration=100", "--pace", "1", "--out", str(tmp_path / "out")]
+    run = subprocess.Popen([*HAPLOOP, *words], stderr=subprocess.PIPE, text=True, start_new_session=True)
+    wait_for("a process of the run", lambda: any(parent == run.pid for _, parent, *_ in processes()))
+    time.sleep(wait_s)
+    with contextlib.suppress(ProcessLookupError):
+        for _ in range(2):
+            os.killpg(run.pid, signal.SIGINT)
+            time.sleep(0.01)
+    _, said = run.communicate(timeout=PATIENCE_S)
+    assert "Traceback" not in said
+    assert run.returncode == 0 or "Interrupted" in said, (run.returncode, said)
+    assert run.returncode in (0, 1, -signal.SIGINT)

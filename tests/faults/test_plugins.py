@@ -120,6 +120,16 @@ def test_a_force_of_another_number_type_gives_the_same_bits_both_ways(launched, 
     assert digests[0] == digests[1]
 
 
+@pytest.mark.slow
+def test_a_thread_that_an_element_leaves_behind_keeps_no_process_of_the_run_and_not_its_verdict(running, brake):
+    thread = "threading.Thread(target=time.sleep, args=[1e6]).start()"
+    source = "import threading, time\n" + ELEMENT.format(at_150=thread)
+    run = started(running, brake, source, sets=("duration=1", 'run.verdict="pushed"'))
+    run.end(0)
+    run.leaves_nothing()
+    assert "stability" in json.loads((run.out / "summary.json").read_text(encoding="utf-8"))
+
+
 NEVER = "while True: pass"
 HANGS = first_and_slowly(
     NEVER,

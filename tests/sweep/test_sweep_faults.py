@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,7 +15,7 @@ import pytest
 
 from haploop.tools.sweep.table import TableError, read
 from helpers.live.in_process import ask
-from helpers.live.launched import Launched, alive, processes, wait_for
+from helpers.live.launched import HAPLOOP, PATIENCE_S, Launched, alive, processes, wait_for
 from helpers.scenes.sweep_files import PRESS, sweep_file, swept
 
 # Such scenes go into no array: so many take so long that something can be done to the sweep meanwhile.
@@ -80,6 +82,23 @@ def test_interrupted_once_it_stores_what_is_under_way_and_says_how_to_go_on(
     again = launched("sweep", str(out / "sweep.toml"), "--workers", "2", out=out)
     again.end(0)
     assert read(out)["cell"].tolist() == list(range(CELLS))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wait_s", [0.0, 0.1, 0.3, 0.6])
+def test_interrupted_while_its_workers_start_it_says_so_and_no_worker_shows_a_traceback(
+    wait_s: float, tmp_path: Path
+) -> None:
+    path = sweep_file(tmp_path, SLOW, SLOW_PRESS)
+    words = ["sweep", str(path), "--workers", "2", "--out", str(tmp_path / "out")]
+    run = subprocess.Popen([*HAPLOOP, *words], stderr=subprocess.PIPE, text=True, start_new_session=True)
+    wait_for("a process of the sweep", lambda: any(parent == run.pid for _, parent, *_ in processes()))
+    time.sleep(wait_s)
+    os.killpg(run.pid, signal.SIGINT)
+    _, said = run.communicate(timeout=PATIENCE_S)
+    assert run.returncode == 1, said
+    assert "Interrupted" in said or "Stopping after the cells in progress" in said
+    assert not any(words in said for words in ("Traceback", "cannot be started"))
 
 
 @pytest.mark.slow

@@ -99,7 +99,8 @@ def make_output(out: Path | None, scene_path: Path, first: str = SCENE, parent: 
             raise OutputError(f"{out} must be new or empty, so that no earlier run is lost; name another with --out.")
     except OSError as error:
         place = parent if out is None else out
-        raise OutputError(f"The run's directory {place} cannot be made: {error.strerror}.") from error
+        why = f"{error.strerror}. Name another with --out."
+        raise OutputError(f"The directory {place} cannot be made: {why}") from error
     return out
 
 

@@ -61,6 +61,8 @@ def resolved(
         raise SceneError(layers.mistakes)
     lay_overrides(layers, overrides)
     layers.data.setdefault("title", layers.path.stem)
+    if isinstance(title := layers.data["title"], str) and not title.isprintable():
+        layers.complain(("title",), "It must be one line of letters that can be printed.")
     put_in_full(layers)
     if kinds is None:
         from haploop.controller.dissipation import registry

@@ -81,7 +81,7 @@ def first_scene(device: str, hand: str, wall: str | None, folder: Path) -> str:
         raise FirstSceneError(f'--wall is "{wall}". It must be a stiffness with its unit, such as --wall "0.5 N/mm".')
     return _left_to_files(
         _TEXT.format(
-            title=inline(f"{Path(device).stem} held by {Path(hand).stem} against a wall of {wall}"),
+            title=inline(f"{Path(device).stem} held by {Path(hand).stem} against a wall"),
             device=inline(_named(files[0], "devices", folder)),
             hand=inline(_named(files[1], "hands", folder)),
             wall=inline(wall),

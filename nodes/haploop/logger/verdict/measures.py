@@ -201,7 +201,8 @@ def measure_window(
     inside = held["in_contact"] > 0
     depth = held["wall_position"] - held["x"]
     real = inside & (np.abs(depth) > ROUNDING * np.abs(held["wall_position"]))
-    stiffness = np.divide(held["total"], depth, out=np.zeros_like(depth), where=real)
+    with np.errstate(over="ignore"):  # an element may ask for any finite force
+        stiffness = np.divide(held["total"], depth, out=np.zeros_like(depth), where=real)
     measured = MeasuredColumns(
         *swings(x, swing_m),
         np.ptp(x, axis=1).tolist() if x.shape[1] else [0.0] * len(x),

@@ -51,7 +51,10 @@ def run_node(role: str, work: Work) -> None:
     sys.stdin = open(os.devnull)  # noqa: SIM115, PTH123 (code that asks for input gets none)
     gc.freeze()
     context = SecureContext.from_transport(Transport.from_dict(start["transport"]))
-    sys.exit(take_part(context, role, work, start, Path(start["directory"]), life=life))
+    status = take_part(context, role, work, start, Path(start["directory"]), life=life)
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(status)  # a thread that a plugin has left behind would keep the process
 
 
 def stay_on(cores: list[int], takes_turns: bool) -> None:

@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 from copy import copy
+from io import TextIOWrapper
 
 from haploop.protocol.installed import PluginError
 from haploop.tools.command.interrupt import SENTENCE, TYPE_CHECKING, LeavingAtOnce
@@ -21,8 +22,8 @@ def main() -> None:
     """Runs the command line. Exit status: 0 done, or stopped in order; 1 failed or interrupted; 2 wrong use."""
     early: dict[str, Started] = {}
     try:
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-        with LeavingAtOnce(early):
+        with (leaving := LeavingAtOnce(early)):
+            _print_anything()
             from haploop.launch.one_thread import ask_for_one_thread
 
             ask_for_one_thread(os.environ)
@@ -38,10 +39,12 @@ def main() -> None:
             asked.registered_commands = [
                 command for command in app.registered_commands if command.name in sys.argv[1:2]
             ] or app.registered_commands
+        leaving.from_the_second_on()
         _refuse_what_is_no_text(sys.argv[1:])
         asked(obj={"early": early})  # typer adds entries of its own to it
     except OSError as error:  # one for which no command has its own message
-        print(f"{error.filename or 'A file'} cannot be used: {error.strerror or error}.", file=sys.stderr)
+        what = error.filename or "What this command prints goes to a place that"
+        print(f"{what} cannot be used: {error.strerror or error}.", file=sys.stderr)
         sys.exit(1)
     except PluginError as error:  # met where a module is loaded, before a command has begun
         print(error, file=sys.stderr)
@@ -49,11 +52,27 @@ def main() -> None:
     except (KeyboardInterrupt, SystemExit) as error:
         if isinstance(error, SystemExit) and error.code != _OF_TYPER:
             raise
+        _heed_no_more_interrupts()
         print(SENTENCE if isinstance(error, KeyboardInterrupt) else "Interrupted.", file=sys.stderr)
         sys.exit(1)
     finally:
+        if early:
+            _heed_no_more_interrupts()
         for process in early.values():  # those that no run has taken over
             process.end()
+
+
+def _heed_no_more_interrupts() -> None:
+    """Lets this process come to its end, which is near, with the status that it has."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+
+
+def _print_anything() -> None:
+    """Makes standard output and error write ? for a letter that the terminal's encoding does not have."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="replace")
 
 
 def _refuse_what_is_no_text(words: list[str]) -> None:

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from haploop.launch.processes.early import Started
 
 SENTENCE = "Interrupted before anything began."
+_AT_ONCE = "Interrupted at once."
+_SIGNALS = signal.SIGINT, signal.SIGTERM
 
 
 class LeavingAtOnce:
@@ -25,15 +27,15 @@ class LeavingAtOnce:
     def __init__(self, processes: Mapping[str, Started] | None = None) -> None:
         self._processes = {} if processes is None else processes
 
-    def _leave(self, *_: object) -> None:
-        os.write(2, f"{SENTENCE}\n".encode())
+    def _leave(self, *_: object, sentence: str = SENTENCE) -> None:
+        os.write(2, f"{sentence}\n".encode())
         for started in self._processes.values():
             started.process.kill()
         os._exit(1)
 
     def __enter__(self) -> None:
         self._before = {}
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in _SIGNALS:
             try:
                 self._before[number] = signal.signal(number, self._leave)
             except ValueError:  # only the main thread may handle signals
@@ -42,3 +44,22 @@ class LeavingAtOnce:
     def __exit__(self, *_: object) -> None:
         for number, handler in self._before.items():
             signal.signal(number, handler)
+
+    def from_the_second_on(self) -> None:
+        """Makes the first of the two signals raise KeyboardInterrupt from now on, and the next end the program.
+
+        A second signal while the first is dealt with would show a traceback, or Python's own exit status.
+        """
+
+        def leave(*_: object) -> None:
+            self._leave(sentence=_AT_ONCE)
+
+        heeded = [number for number, handler in self._before.items() if handler != signal.SIG_IGN]
+
+        def interrupt(*_: object) -> None:
+            for number in heeded:
+                signal.signal(number, leave)
+            raise KeyboardInterrupt
+
+        for number in heeded:
+            signal.signal(number, interrupt)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent import futures
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any, Self, TypeVar
 
@@ -21,6 +21,7 @@ from haploop.protocol.plugin_file import bring_source
 from haploop.protocol.transport.prints import unheard
 from haploop.tools.machine import cores
 
+_INTERRUPT = {signal.SIGINT}
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
 
@@ -116,7 +117,7 @@ class ProcessExecutor(Executor):
         self._pipe: tuple[Connection, Connection] | None = None  # the workers' end, and ours
 
     def submit(self, call: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        with _one_thread_each():  # processes may be started at any submit
+        with _one_thread_each(), _interrupts_held_back():  # processes may be started at any submit
             if self._executor is None:
                 self._start()
             assert self._executor
@@ -194,7 +195,19 @@ def _begin(held: Connection, sources: tuple[tuple[str, str], ...]) -> None:
         os._exit(1)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _INTERRUPT)
     threading.Thread(target=end_with, daemon=True).start()
+
+
+@contextlib.contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Delivers Ctrl-C only afterwards; processes started in here inherit that it is blocked, until ``_begin``."""
+    resource_tracker.ensure_running()  # its start would let Ctrl-C through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _INTERRUPT)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _bring(sources: tuple[tuple[str, str], ...]) -> None:
