@@ -13,6 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from haploop.tools.cli.app import app
+from haploop.tools.command.options import note_without_numba
 from helpers.live.launched import HAPLOOP
 
 SCENES = Path(__file__).parents[1] / "launch" / "scenes"
@@ -220,3 +221,14 @@ def test_a_name_that_would_steer_the_terminal_is_refused() -> None:
     assert "title is" in done.stderr
     assert "It must be one line of letters that can be printed." in done.stderr
     assert "\x1b" not in done.stderr
+
+
+def test_without_numba_many_runs_begin_with_a_note_and_with_it_without(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "numba", None)
+    note_without_numba()
+    assert "pip install 'haploop[numba]'" in capsys.readouterr().err
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: name)
+    note_without_numba()
+    assert capsys.readouterr().err == ""

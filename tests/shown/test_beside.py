@@ -13,7 +13,7 @@ from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.bundled import of_name
 from haploop.protocol.scene.paths import with_value
 from haploop.tools.cli.app import app
-from haploop.tools.cli.runs_beside import difference_table
+from haploop.tools.cli.runs_beside import difference_table, parting_words
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.difference import Parting, difference, unlike_keys
 from haploop.tools.figure.overlay import MOST_RUNS, make_overlay
@@ -133,6 +133,13 @@ def test_ticks_of_unlike_clocks_are_not_compared(runs):
     found = difference(*data(runs, "a", "slow"))
     assert found.parting is None
     assert found.why_not == "Ticks are not compared: one run has 1000 a second, the other 500."
+
+
+def test_runs_that_part_at_their_first_tick_have_no_bits_that_are_the_same(runs):
+    found = replace(difference(*data(runs, "a", "swapped")), parting=Parting(0, 0.0, "wall"))
+    assert parting_words(found) == (
+        "They part at their first tick, where the force of the wall (column wall) differs first."
+    )
 
 
 def test_diff_tells_it_as_a_table_and_as_one_json_object(runs):

@@ -23,7 +23,7 @@ from haploop.tools.advise.walls.cases import Case, make_loop
 from haploop.tools.advise.walls.store import Store
 from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.command.given import kinds_with, print_notes
-from haploop.tools.command.options import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.command.options import FAILED, WRONG_USE, leave, note_without_numba, plain_errors, print_json
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.terminal import console
 
@@ -58,6 +58,7 @@ def advise(
         except InvalidRequest as error:
             leave(str(error), WRONG_USE)
         try_out(elements_of(asked.scene), kinds)
+        note_without_numba()
         tried = Case(1.0).scene(make_loop(asked.scene, asked.has_task))
         # The stiffness in a loop to be searched is a placeholder.
         tried = with_value(tried, "wall.stiffness", value_at(asked.scene, "wall.stiffness"))

@@ -41,11 +41,12 @@ def formulas(loop: Scene) -> list[Formula]:
     friction = loop.friction.kinetic if loop.friction else 0.0
     chain, period_s = Chain.from_scene(loop), 1.0 / loop.clock.control_rate
     b = next(b for name, (body, b) in chain.grounded.items() if body == 0 and name != "hand")
+    abbott = f"{ABBOTT}, for no delay" if loop.clock.round_trip_delay else ABBOTT
     found = [
         Formula("K q <= 2 f_c", f"2 x {amount(friction, 'N')} / {amount(q, 'm')}" if q else "no encoder",
-                "chatters between two counts", ABBOTT, 2.0 * friction / q if q else math.inf),
+                "chatters between two counts", abbott, 2.0 * friction / q if q else math.inf),
         Formula("K <= 2 b / T", f"2 x {b:.3g} N s/m / {amount(period_s, 's')}",
-                "generates energy; friction or hand must absorb it", ABBOTT, 2.0 * b / period_s),
+                "generates energy; friction or hand must absorb it", abbott, 2.0 * b / period_s),
     ]  # fmt: skip
     smooth = replace(loop, encoder=None, friction=None, noise=None, actuator=None, dissipation=())
     kinds = installed_kinds()

@@ -126,6 +126,8 @@ def parting_words(found: Difference) -> str:
         return f"Every bit that both logs hold is the same; ticks in both: {found.ticks}."
     tick, at_s, column = found.parting.tick, found.parting.at_s, found.parting.column
     what = f"{_COLUMNS[column]} (column {column})" if column in _COLUMNS else f"column {column}"
+    if not tick:
+        return f"They part at their first tick, where {what} differs first."
     return f"They part at tick {tick}, at {at_s:g} s: up to there every bit is the same, then {what} differs first."
 
 

@@ -14,7 +14,7 @@ import typer
 from haploop.tools.command.options import WRONG_USE, leave, parse_seconds
 
 _ADDRESS = "a run elsewhere, HOST:PORT as printed by haploop run --tcp"
-_TIME = 'simulated time of the change, s or "1500 ms" [at once]; or '
+_TIME = 'simulated time of the change, s or "1500 ms" [as soon as it can be, mostly within 2 s]; or '
 _KEYS = typer.Option("--keys", metavar="DIR", help="with --at: directory with its clock.key and client.key_secret")
 
 

@@ -132,9 +132,18 @@ def parse_seconds(text: str | None, option: str = "--at") -> float | None:
 
 
 FAILED, WRONG_USE = 1, 2
+_NO_NUMBA = "Note: numba is not installed; with it this takes a fraction of the time: pip install 'haploop[numba]'."
 # Parts of a log that end within this time of each other, s, are said to end together.
 _APART_S = 0.01
 _LOGGED = "What was logged is in {0}: {1}. The books end where the first of these does."
+
+
+def note_without_numba() -> None:
+    """Notes on stderr that many runs would take less time with numba, where it is not installed."""
+    from importlib.util import find_spec
+
+    if find_spec("numba") is None:
+        print(_NO_NUMBA, file=sys.stderr)
 
 
 def leave(message: str, status: int) -> NoReturn:

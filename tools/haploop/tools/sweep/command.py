@@ -16,7 +16,7 @@ from haploop.launch.processes.children import interrupts
 from haploop.launch.spec import PLUGINS, OutputError, keep_plugin, kept_name, make_output
 from haploop.logger.log import LogError
 from haploop.logger.summary import Summary, read, write
-from haploop.tools.command.options import FAILED, WRONG_USE, leave, plain_errors, print_json
+from haploop.tools.command.options import FAILED, WRONG_USE, leave, note_without_numba, plain_errors, print_json
 from haploop.tools.executor.executors import ExecutorError
 from haploop.tools.executor.pool import Pool, read_sources
 from haploop.tools.machine import machine, versions
@@ -58,6 +58,7 @@ def sweep(request: Request, as_json: bool) -> None:
     if request.workers is not None and request.workers < 1:
         leave(f"--workers must be at least 1, but {request.workers} was given.", WRONG_USE)
     with plain_errors():
+        note_without_numba()
         try:
             directory, summary = carry_out(request)
         except (NeedsPyarrow, ExecutorError) as error:
