@@ -171,8 +171,8 @@ def test_a_loop_that_rests_after_one_push_and_swings_on_after_the_other_is_undec
     assert found.why == ("larger rests" if larger_rests else "smaller rests")
     assert (found.frequency_Hz, found.width_m) == pytest.approx((40.0, 2e-3), rel=0.02)
     assert "either may happen" in found.sentence()
-    tiny = [1e-3 * x[None] for x in (small, large, large)]
-    [unfelt] = measure(Pushed(*tiny, one, 1e-5 * one, one > 0, one > 0, one > 0), 1000.0)
+    tiny = Pushed(1e-3 * small[None], 1e-3 * large[None], large[None], one, 1e-5 * one, one > 0, one > 0, one > 0)
+    [unfelt] = measure(tiny, 1000.0)
     assert decide(unfelt, last=True).word == "steady"
 
 

@@ -60,7 +60,8 @@ def make_columns(
             complain(place, f"It is a table; name one of {', '.join(inner[:8])}.", None)
         else:
             complain(place, "It must be a dotted key of a run's summary.", nearest(name, known))
-    wanted = dict.fromkeys([VERDICT, *names, *([PROVISOS] if _is_pushed(sweep.base) else [])])
+    conditions = [PROVISOS] if _is_pushed(sweep.base) else []
+    wanted = dict.fromkeys((VERDICT, *names, *conditions))
     return [Column(name, _kind(name, known.get(name)), unit_of(name)) for name in wanted if name not in (ENDED, WHY)]
 
 
