@@ -49,10 +49,10 @@ def with_causes(end: End, found: Finding) -> Finding:
     """
     if found.word not in ("limit-cycle", "growing", "diverged") or not end.controller.params.wall.inward:
         return found
+    if (found.word == "diverged" or found.why == _LEAVES) and _is_pressed_through(end):
+        return replace(found, without={})
     start = _start(end, found)
-    if start is None:
-        return replace(found, without={}) if found.word == "diverged" or found.why == _LEAVES else found
-    if not _is_alike(as_is := _watched(end, start), found):
+    if start is None or not _is_alike(as_is := _watched(end, start), found):
         return found
     parts = idealised(start) | {HOLD: faster(start)} | (elements := uncontrolled(start))
     does = {name: _does(_watched(end, scene), as_is) for name, scene in parts.items()}
@@ -63,12 +63,26 @@ def with_causes(end: End, found: Finding) -> Finding:
     return replace(found, without=does)
 
 
+def _is_pressed_through(end: End) -> bool:
+    """Tells whether a still hand presses harder on the device at its limit than wall, or actuator, answer there.
+
+    Statically: the hand's spring and its grip are in series.
+    """
+    scene, wall = end.scene, end.controller.params.wall
+    at_m = wall.inward * scene.diverged_beyond
+    press_N, hand = end.hold_N, scene.hand
+    if hand and hand.stiffness:
+        share = hand.grip.stiffness / (hand.grip.stiffness + hand.stiffness) if hand.grip else 1.0
+        press_N = share * (press_N + hand.stiffness * (hand.rest - at_m))
+    most_N = (scene.actuator and scene.actuator.saturation) or math.inf
+    return wall.inward * press_N > min(wall.held(abs(at_m - wall.position)), most_N)
+
+
 def _start(end: End, found: Finding) -> Scene | None:
-    """Returns the scene that the trials begin with; None if wall and actuator do not hold the hand within the limit."""
+    """Returns the scene that the trials begin with; None if the wall does not hold the hand within the limit."""
     scene, wall = end.scene, end.controller.params.wall
     press_N = abs(press_of(end.hold_N, scene.hand, wall.position))
-    most_N = (scene.actuator and scene.actuator.saturation) or math.inf
-    if wall.held(depth_m := depth_of(wall, press_N)) < _HOLDS * press_N or most_N < press_N:
+    if wall.held(depth_m := depth_of(wall, press_N)) < _HOLDS * press_N:
         return None
     if abs(wall.position + wall.inward * depth_m) > scene.diverged_beyond:
         return None
