@@ -90,6 +90,11 @@ def test_of_two_columns_that_may_be_the_position_it_asks_which(tmp_path: Path, h
     assert outcome(path, layout=Layout("2"), dampings=["1.0"]).recording.notes.rows == len(ROWS)
 
 
+def test_columns_without_a_name_are_listed_by_their_numbers(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"There are: 1, 2, F\."):
+        outcome(recorded(tmp_path, ",,F", rows=[f"{row},0" for row in ROWS]), dampings=["1.0"])
+
+
 @pytest.mark.parametrize(("code", "named"), [("utf-16", "UTF-16"), ("cp1252", "CP1252")])
 def test_the_command_that_turns_other_text_into_utf_8_names_the_code_it_is_in(
     tmp_path: Path, code: str, named: str

@@ -78,7 +78,7 @@ class DelimitedFile:
             header = named if len(named) == len(cells) else [str(i + 1) for i in range(len(cells))]
         named_units = [name_and_unit(cell) for cell in header]
         self.columns = [
-            Column(index, name, unit or (units[index] if units else ""))
+            Column(index, name or str(index + 1), unit or (units[index] if units else ""))
             for index, (name, unit) in enumerate(named_units)
         ]
 
