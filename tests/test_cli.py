@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from importlib.metadata import version
@@ -14,6 +15,7 @@ from typer.testing import CliRunner
 
 from haploop.tools.cli.app import app
 from haploop.tools.command.options import note_without_numba
+from helpers.live.in_process import ask
 from helpers.live.launched import HAPLOOP
 
 SCENES = Path(__file__).parents[1] / "launch" / "scenes"
@@ -232,3 +234,11 @@ def test_without_numba_many_runs_begin_with_a_note_and_with_it_without(
     monkeypatch.setattr("importlib.util.find_spec", lambda name: name)
     note_without_numba()
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.slow
+def test_a_command_leaves_the_signals_of_the_program_that_called_it_as_they_were(tmp_path: Path) -> None:
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    for words in (["run", "fig6c", "--set", "duration=0.01", "--out", str(tmp_path / "out")], ["run", "nowhere"]):
+        assert not ask(*words).fault
+        assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before

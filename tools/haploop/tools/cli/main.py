@@ -9,7 +9,7 @@ from copy import copy
 from io import TextIOWrapper
 
 from haploop.protocol.installed import PluginError
-from haploop.tools.command.interrupt import SENTENCE, TYPE_CHECKING, LeavingAtOnce
+from haploop.tools.command.interrupt import SENTENCE, SIGNALS, TYPE_CHECKING, LeavingAtOnce
 
 if TYPE_CHECKING:
     from haploop.launch.processes.early import Started
@@ -21,6 +21,7 @@ _OF_TYPER = 130
 def main() -> None:
     """Runs the command line. Exit status: 0 done, or stopped in order; 1 failed or interrupted; 2 wrong use."""
     early: dict[str, Started] = {}
+    before = {number: signal.getsignal(number) for number in SIGNALS}
     try:
         with (leaving := LeavingAtOnce(early)):
             _print_anything()
@@ -60,11 +61,13 @@ def main() -> None:
             _heed_no_more_interrupts()
         for process in early.values():  # those that no run has taken over
             process.end()
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _heed_no_more_interrupts() -> None:
     """Lets this process come to its end, which is near, with the status that it has."""
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
 

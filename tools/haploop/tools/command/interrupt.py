@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 SENTENCE = "Interrupted before anything began."
 _AT_ONCE = "Interrupted at once."
-_SIGNALS = signal.SIGINT, signal.SIGTERM
+SIGNALS = signal.SIGINT, signal.SIGTERM
 
 
 class LeavingAtOnce:
@@ -35,7 +35,7 @@ class LeavingAtOnce:
 
     def __enter__(self) -> None:
         self._before = {}
-        for number in _SIGNALS:
+        for number in SIGNALS:
             try:
                 self._before[number] = signal.signal(number, self._leave)
             except ValueError:  # only the main thread may handle signals
