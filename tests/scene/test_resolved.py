@@ -56,7 +56,7 @@ _EVENTS = st.lists(st.tuples(st.floats(0, 0.9), _CHANGE).map(lambda event: {"at"
 _SCENES = st.fixed_dictionaries(
     {},
     optional={
-        "title": _TEXT,
+        "title": st.text(st.characters(exclude_categories=["Cs", "Cc", "Zl", "Zp"]), max_size=12),
         "seed": st.integers(0, 2**63 - 1),
         "wall": st.fixed_dictionaries({"position": _NUMBER, "stiffness": _POSITIVE}),
         "hand": st.fixed_dictionaries({"rest": _NUMBER}, optional={"force": _RAMP | _TRACE}),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,6 +20,8 @@ from haploop.protocol.scene.scene import Scene
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
+# What steers a terminal, or ends a line.
+_CONTROLS = re.compile("[\\x00-\\x1f\\x7f-\\x9f\\u2028\\u2029]")
 _A_SWEEP = "A sweep is run by haploop sweep {}; it names a scene and says what is varied in it."
 
 
@@ -61,7 +64,7 @@ def resolved(
         raise SceneError(layers.mistakes)
     lay_overrides(layers, overrides)
     layers.data.setdefault("title", layers.path.stem)
-    if isinstance(title := layers.data["title"], str) and not title.isprintable():
+    if isinstance(title := layers.data["title"], str) and _CONTROLS.search(title):
         layers.complain(("title",), "It must be one line of letters that can be printed.")
     put_in_full(layers)
     if kinds is None:
