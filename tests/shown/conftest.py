@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from haploop.launch.runs.start import prepare, run
+from haploop.launch.scene.bundled import bundled
 from helpers.runs.drawn import BUSY, NO_WALL, made
 
 # Scene and settings of each.
@@ -36,3 +39,9 @@ class Runs(dict[str, Path]):
 @pytest.fixture(scope="session")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return Runs(tmp_path_factory.mktemp("runs"))
+
+
+@pytest.fixture(scope="session")
+def swap(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """The summary of a run that swaps its element."""
+    return run(prepare(bundled("scenes")["swap"], out=tmp_path_factory.mktemp("run") / "swap"), in_process=True)

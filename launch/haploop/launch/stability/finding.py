@@ -77,8 +77,8 @@ class Finding:
         without: for a loop that swings, what it does without each of its parts, by the part's name, such as
             ``friction``; at a higher control rate (``sampling and hold``) and without ``all`` of these if it swings
             without any one of them: rests, swings within its limit (which the loop leaves otherwise), swings less (than
-            a third as wide), swings otherwise (at another frequency), swings on, or undecided. None if
-            not asked, or if it does not swing when started anew; empty if the hand presses harder than the wall answers
+            a third as wide), swings otherwise (at another frequency), swings on, or undecided. None if not
+            asked, or if it does not swing when started anew; empty if the hand presses harder than the wall answers
             within the device's limit, or than the actuator can.
         settles_s: how long after the push it came within 5 % of where it rests; None if it does not.
         memory_drifts: whether the memory of an element still changes while the loop rests.
