@@ -102,14 +102,16 @@ def test_the_browser_is_opened_with_a_link_that_holds_no_token(launched, tmp_pat
 def test_run_with_view_serves_the_run_and_stays_until_ctrl_c(launched, tmp_path, monkeypatch):
     """In real time; the run ends, the page shows its summary, and the viewer goes with the launcher."""
     monkeypatch.delenv("DISPLAY", raising=False)
-    run = launched("run", str(SCENE), "--set", "duration=4", "--view", "--json", out=tmp_path / "out")
+    words = ["--set", "duration=0.5", "--set", "event=[{at=0, pause=true}]", "--view", "--json"]
+    run = launched("run", str(SCENE), *words, out=tmp_path / "out")
 
     async def play(tab: Tab) -> dict[str, Any]:
+        assert (await tab.phase("paused"))["pace"] == 1.0
+        assert (await tab.ask("resume"))[0]
         return await tab.phase("ended")
 
     state = browse(run, play)
-    assert state["summary"]["ticks"] == 4000
-    assert state["pace"] == 1.0
+    assert state["summary"]["ticks"] == 500
     run.says("Ctrl-C ends it")
     run.says("The run is over; its page stays at http")
     viewers = [pid for pid, parent, _, _ in processes() if parent == run.pid]
