@@ -75,6 +75,16 @@ def test_runs_part_at_the_first_tick_in_contact_after_their_only_event(runs):
     assert found.results["trajectory_sha256"][0] != found.results["trajectory_sha256"][1]
 
 
+def test_what_was_changed_in_one_of_two_live_runs_is_told_though_their_scenes_are_the_same(runs):
+    first, second = data(runs, "a", "again")
+    live = {"timestamp": 0.25, "tick": 250, "swap": {"kind": "damping", "damping": 0.8}, "element": 0}
+    found = difference(first, replace(second, events=[live]))
+    assert (found.scene, found.events[0]) == ({}, [])
+    words = "at 0.25 s: element 0 becomes damping (damping 0.8 N s/m)"
+    assert row(shown(difference_table(found), 200), "what happened") == ["–", words]
+    assert "what happened" not in shown(difference_table(difference(first, second)), 200)
+
+
 def test_a_title_that_both_runs_have_is_no_row_of_what_they_differ_in(runs):
     told = shown(difference_table(difference(*data(runs, "a", "bare"))), 140)
     assert not any(line.strip().startswith("title") for line in told.splitlines())

@@ -103,6 +103,8 @@ def difference_table(found: Difference) -> RenderableType:
         table.add_row(Text(key), *map(Text, map(str.rstrip, told)))
     if not found.scene:
         table.add_row("scene", "the same", "the same")
+    if any(found.events):
+        table.add_row("what happened", *(Text("\n".join(events) or "–") for events in found.events))
     table.add_section()
     for name, pair in found.results.items():
         words, unit = _WORDS[name]

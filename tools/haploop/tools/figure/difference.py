@@ -12,6 +12,7 @@ import numpy as np
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.scene.table import Tables
 from haploop.tools.figure.data import TOGETHER, RunData
+from haploop.tools.figure.event_words import event_words
 from haploop.tools.figure.run_names import run_names
 from haploop.tools.figure.scene_units import unit_at
 from haploop.tools.render.report import plant_books
@@ -37,6 +38,7 @@ class Difference:
         runs: the names of their directories; names: their titles.
         scene: dotted key -> both values, where they differ; None where one scene has no such key.
         units: of the numbers among these keys, "" for none.
+        events: of either run in words, those made live too, where they differ.
         results: results of both runs, by name: verdict, end, hash.
         energies_J: by the name of the book, in J; None where one run has no such book.
         ticks: number of ticks that both logs hold.
@@ -47,6 +49,7 @@ class Difference:
     names: tuple[str, str]
     scene: Mapping[str, Pair]
     units: Mapping[str, str]
+    events: tuple[Sequence[str], Sequence[str]]
     results: Mapping[str, Pair]
     energies_J: Mapping[str, tuple[float | None, float | None]]
     ticks: int
@@ -60,11 +63,13 @@ def difference(a: RunData, b: RunData, *, runs: tuple[str, str] = ("first", "sec
     results = [_results(run) for run in (a, b)]
     energies = [_energies_J(run) for run in (a, b)]
     scene = unlike_keys([a.scene, b.scene])
+    events = event_words(a), event_words(b)
     return Difference(
         runs=runs,
         names=(a.scene.title, b.scene.title),
         scene=scene,
         units={key: unit_at(a.scene, key, a.units) or unit_at(b.scene, key, b.units) for key in scene},
+        events=events if events[0] != events[1] else ((), ()),
         results={name: (results[0].get(name), results[1].get(name)) for name in results[0] | results[1]},
         energies_J={name: (energies[0].get(name), energies[1].get(name)) for name in energies[0] | energies[1]},
         ticks=ticks,

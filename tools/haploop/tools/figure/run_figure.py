@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from haploop.launch.plan.effects import notes
-from haploop.protocol.changes import Change, describe, is_change
 from haploop.tools.figure import style
 from haploop.tools.figure.data import TOGETHER, Book, RunData
+from haploop.tools.figure.event_words import event_words
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
 from haploop.tools.figure.own_columns import draw_own_columns, own_columns
-from haploop.tools.figure.scene_units import unit_at
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
 from haploop.tools.render.report import HELD, count_losses, leak_rows, noted, plant_books, swing_words
 from haploop.tools.render.terminal import told
@@ -195,11 +194,9 @@ def book_rows(run: RunData, books: list[Book]) -> list[Row]:
 
 def event_lines(run: RunData) -> list[str]:
     """Returns the numbered events as lines that fit below the figure."""
-    lines, scene = [""], run.scene
-    for number, event in enumerate(run.events, start=1):
-        units = {key: unit_at(scene, key, run.units) for key in event.get("set", ())}
-        scene = Change.from_dict(0, event).apply(scene) if is_change(event) else scene
-        words = f"{number} at {event['timestamp']:g} s: {describe(event, {**run.units, **units})}"
+    lines = [""]
+    for number, event in enumerate(event_words(run), start=1):
+        words = f"{number} {event}"
         if lines[-1] and len(lines[-1]) + len(words) + 5 > _LINE_LETTERS:
             if len(lines) == _MOST_LINES:
                 lines[-1] += f"     and {len(run.events) - number + 1} more"
