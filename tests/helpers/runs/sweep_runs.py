@@ -35,7 +35,7 @@ def engine_run(made: Any, out: Path, stop_after: int | None = None, workers: int
     (out / "sweep.toml").write_text(made.toml())
     told = Quiet()
     with Store(out, make_schema(made.columns(), made.toml())) as store, Pool(workers) as pool:
-        stop = lambda: stop_after is not None and len(told.cells) >= stop_after  # noqa: E731
+        stop = lambda _: stop_after is not None and len(told.cells) >= stop_after  # noqa: E731
         try:
             return told, Engine(made, store, pool, told, stop).run()
         except Stopped:

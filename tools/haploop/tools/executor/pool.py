@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -17,6 +17,9 @@ from haploop.logger.summary import Summary
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.executors import make_executor
 from haploop.tools.executor.work import Work
+
+# Asked whether to stop, with the number of items under way.
+Stop = Callable[[int], bool]
 
 _POLL_S = 0.3
 DIED = "The process that ran it died: it was killed, ran out of memory or crashed in compiled code."
@@ -133,7 +136,7 @@ class Pool:
                 yield index, result
 
     def parts(
-        self, work: Work, groups: Iterable[Group], count: int | None = None, stop: Callable[[], bool] = lambda: False
+        self, work: Work, groups: Iterable[Group], count: int | None = None, stop: Stop = lambda _: False
     ) -> Generator[list[tuple[Any, Any]]]:
         """Does some work on items, part by part; no more than two parts a worker are under way.
 
@@ -142,7 +145,7 @@ class Pool:
 
         Args:
             groups: groups of items that belong together; taken when there is room for them.
-            stop: asked before each part; True ends the work after those under way.
+            stop: asked before each part, with the number of items under way; True ends the work after these.
 
         Yields:
             For each finished part, its items, each with what is kept of it.
@@ -155,7 +158,7 @@ class Pool:
         flying: dict[Future[Any], Group] = {}
         try:
             while True:
-                while not stop() and len(flying) < self._executor.room and (part := next(source, None)):
+                while not stop(_items(flying)) and len(flying) < self._executor.room and (part := next(source, None)):
                     flying[self._submitted(work, part.items)] = part
                 if not flying:
                     return
@@ -176,9 +179,9 @@ class Pool:
             for future in flying:
                 future.cancel()
 
-    def _by_itself(self, work: Work, items: Sequence[Any], stop: Callable[[], bool]) -> Iterator[list[tuple[Any, Any]]]:
+    def _by_itself(self, work: Work, items: Sequence[Any], stop: Stop) -> Iterator[list[tuple[Any, Any]]]:
         self._executor.renew()
-        if stop():
+        if stop(0):
             return
         if outcome := self._outcome(self._submitted(work, items)):
             yield list(zip(items, outcome[1], strict=True))
@@ -210,6 +213,10 @@ def read_sources(plugins: Iterable[Path]) -> tuple[tuple[str, str], ...]:
     for path in plugins:
         load_plugin(path)
     return tuple((str(path), path.read_text(encoding="utf-8")) for path in map(Path, plugins))
+
+
+def _items(flying: Mapping[Any, Group]) -> int:
+    return sum(len(part.items) for part in flying.values())
 
 
 def _second(item: tuple[int, Scene]) -> Scene:

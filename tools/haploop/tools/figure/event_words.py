@@ -8,7 +8,7 @@ from haploop.tools.figure.scene_units import unit_at
 
 
 def event_words(run: RunData) -> list[str]:
-    """Returns a run's events in order, those of the scene and those made live: ``at 1 s: set wall.stiffness = 90 N/m``."""
+    """Returns a run's events in order, the scene's and those made live: ``at 1 s: set wall.stiffness = 90 N/m``."""
     words, scene = [], run.scene
     for event in run.events:
         units = {key: unit_at(scene, key, run.units) for key in event.get("set", ())}

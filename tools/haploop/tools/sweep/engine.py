@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
 from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any, Self
 
-from haploop.tools.executor.pool import Group, Pool
+from haploop.tools.executor.pool import Group, Pool, Stop
 from haploop.tools.executor.work import Work
 from haploop.tools.render.terminal import console
 from haploop.tools.sweep.boundary import Boundary, Candidate, find_boundaries, verdict_is
@@ -100,12 +100,13 @@ class SweepProgress:
         done, counts = sum(self.counts.values()), describe_counts(self.counts)
         self._bars.update(self._task, completed=done, rate=rate, counts=counts)
 
-    def stopping(self, received: Sized) -> bool:
-        """Tells whether interrupts have been received; says so once, on a terminal or not."""
+    def stopping(self, received: Sized, under_way: int) -> bool:
+        """Tells whether interrupts have been received; says so once, on a terminal or not, with the cells under way."""
         if received and not self._stopping:
             self._stopping = True
             self._bars.console.print(
-                "Stopping after the cells in progress; interrupt again to end at once.", highlight=False
+                f"Stopping after the cells in progress ({under_way}); interrupt again to end at once.",
+                highlight=False,
             )
         return bool(received)
 
@@ -125,7 +126,7 @@ class Engine:
 
     Args:
         store: where its rows go, and where those of an earlier call are.
-        stop: called between parts; True ends the sweep after those under way.
+        stop: called between parts with the number of cells under way; True ends the sweep after these.
         compiled: whether to run compiled by JAX.
     """
 
@@ -135,7 +136,7 @@ class Engine:
         store: Store,
         pool: Pool,
         progress: SweepProgress,
-        stop: Callable[[], bool],
+        stop: Stop,
         compiled: bool = False,
     ) -> None:
         self._sweep, self._store, self._pool, self._progress, self._stop = sweep, store, pool, progress, stop
