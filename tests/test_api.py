@@ -52,8 +52,10 @@ def test_a_wrong_quantity_is_told_with_the_nearest() -> None:
         result["/plnt"]
     with pytest.raises(KeyError, match=r"no column forse \(did you mean force\?\)"):
         result["/plant"]["forse"]
-    with pytest.raises(SceneError, match=r"did you mean stiffness\?"):
+    with pytest.raises(SceneError, match=r"^values: wall.stifness is not a key of \[wall\]; did you mean stiffness\?"):
         load("fig6c", {"wall.stifness": 1})
+    with pytest.raises(SceneError, match=r"^values: duration is -1\."):
+        result.scene.set({"duration": -1})
     with pytest.raises(ValueError, match="kept in memory only"):
         plot(result)
 

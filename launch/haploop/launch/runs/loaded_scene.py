@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from haploop.controller.tried import try_kinds
 from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
+from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError
 from haploop.launch.scene.reading.layers import Layers, lay_overrides
 from haploop.launch.scene.toml_writer import inline, to_toml
 from haploop.launch.scene.unmodelled import demand_modelled
@@ -106,8 +108,9 @@ class LoadedScene:
             raise TypeError(SET_SO)
         if at is None:
             layers = Layers(self.path, self.tables)
-            lay_overrides(layers, texts(values))
-            return self._resolved(layers)
+            with _mistakes_of_values():
+                lay_overrides(layers, texts(values))
+                return self._resolved(layers)
         if not isinstance(values, Mapping):
             raise TypeError(SET_SO)
         return self._with_event({"at": plain(at), "set": plain(values)}, "set")
@@ -169,7 +172,19 @@ def load(
         files |= dict.fromkeys(found, plugin)
     kinds |= (given := {checked(element, element.__name__).kind: element for element in elements})
     files = {kind: file for kind, file in files.items() if kind not in given}
-    return LoadedScene(scene_file.load(path, texts(values), kinds), Path(path), kinds, files, paths)
+    with _mistakes_of_values():
+        scene = scene_file.load(path, texts(values), kinds)
+    return LoadedScene(scene, Path(path), kinds, files, paths)
+
+
+@contextmanager
+def _mistakes_of_values() -> Iterator[None]:
+    """Reports the mistakes of values given in Python as those of ``values``, not of the command line."""
+    try:
+        yield
+    except SceneError as error:
+        mistakes = (replace(one, file="values") if one.file == COMMAND_LINE else one for one in error.mistakes)
+        raise SceneError(mistakes) from None
 
 
 def texts(values: Values) -> list[str]:
