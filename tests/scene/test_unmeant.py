@@ -23,6 +23,13 @@ FORCE = {"kind": "constant"}
 HELD = {"mass": 0.1, "damping": 2.0, "stiffness": 100.0, "grip": {"stiffness": 500.0, "damping": 1.0}}
 HELD["force"] = {**FORCE, "value": -0.2}
 THROWN = {"mass": 0.05, "damping": 0.1, "velocity": -0.3}
+
+
+def recorded(samples: int, last_N: float) -> dict[str, Any]:
+    """A force sampled every 10 ms."""
+    return {"kind": "trace", "time": [0.01 * k for k in range(samples)], "force": [*[-9.0] * (samples - 1), last_N]}
+
+
 # Tables that break each rule, and a neighbour of them that keeps it; what the sentence must hold.
 CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"duration": 3, "clock": {"control_rate": 10_000, "round_trip_delay": 0.2}},
@@ -60,6 +67,12 @@ CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
      "encoder.resolution is 1 m; is that the unit"),
     ({"hand": PUSHED, "device": {"mass": 50, "damping": 0.1}}, {"hand": PUSHED, "device": {"mass": 5, "damping": 0.1}},
      "device.mass is 50 kg; is that the unit"),
+    ({"hand": PUSHED, "wall": {"position": -0.01, "stiffness": 4e5}},
+     {"hand": PUSHED, "wall": {"position": -0.01, "stiffness": 4e4}}, "wall.stiffness is 400000 N/m; is that the unit"),
+    ({"hand": PUSHED | {"force": recorded(99, -10.0)}}, {"hand": PUSHED | {"force": recorded(99, 0.0)}},
+     "ends at 0.98 s and the run at 1 s; its last value, -10 N, is held"),
+    ({"hand": PUSHED | {"force": recorded(99, -10.0)}}, {"hand": PUSHED | {"force": recorded(2, -10.0)}},
+     "The recorded force ends at"),
     ({"hand": PUSHED, "duration": 1e5}, {"hand": PUSHED, "duration": 1e4}, "The run has 1e+08 ticks"),
     ({"hand": PUSHED, "dissipation": [{"kind": "damping", "damping": 1.0}]},
      {"hand": PUSHED, "dissipation": [{"kind": "damping", "damping": 1.0, "acts": "always"}]}, "Nothing is ever in"),

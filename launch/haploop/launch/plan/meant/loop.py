@@ -6,6 +6,7 @@ import math
 
 from haploop.launch.plan.meant.hand_and_wall import inward, inward_force_N, start_depth_m, wall_moves
 from haploop.launch.plan.meant.rule import Found, Rule
+from haploop.protocol.scene.hand_force import Trace
 from haploop.protocol.scene.scene import NO_ELEMENT, Scene, accelerometer_is_used, hand_is_unmodelled
 from haploop.protocol.walls.registry import make_wall
 
@@ -13,6 +14,7 @@ from haploop.protocol.walls.registry import make_wall
 SOFTEST_N_M = 20.0
 _MANY_TICKS, _DEEP_M = 1000, 1e-3
 _LONG_TICKS = 10_000_000
+_RECORDED_SAMPLES = 50
 # A hand that presses deeper than this is at the end of the travel of most devices.
 _DEEPEST_PRESSED_M = 0.02
 
@@ -26,6 +28,16 @@ def _late(scene: Scene) -> Found | None:
 def _long(scene: Scene) -> Found | None:
     ticks = scene.duration * scene.clock.control_rate
     return {"ticks": ticks, "duration_s": scene.duration} if ticks > _LONG_TICKS else None
+
+
+def _trace_too_short(scene: Scene) -> Found | None:
+    """Tells whether a recorded force ends before the run, at a force other than 0; few samples are no recording."""
+    force = scene.hand.force if scene.hand else None
+    if not isinstance(force, Trace) or len(force.time) < _RECORDED_SAMPLES:
+        return None
+    if not force.force[-1] or force.time[-1] >= scene.duration:
+        return None
+    return {"end_s": force.time[-1], "duration_s": scene.duration, "last_N": force.force[-1]}
 
 
 def _no_contact(scene: Scene) -> Found | None:
@@ -106,6 +118,12 @@ LOOP = (
         _long,
         "duration",
         "The run has {ticks:.3g} ticks, {duration_s:.6g} s, and its log holds them all; is that the unit you meant?",
+    ),
+    Rule(
+        _trace_too_short,
+        "hand.force",
+        "The recorded force ends at {end_s:g} s and the run at {duration_s:g} s; its last value, {last_N:.3g} N, is "
+        "held from then on.",
     ),
     Rule(
         _no_contact,

@@ -13,7 +13,7 @@ from haploop.protocol.scene.scene import Scene
 # Beyond these bounds a number is valid, but more often a slip of the unit: key, least, most, unit.
 _USUAL = (
     ("clock.round_trip_delay", 0.0, 1.0, "s"),
-    ("wall.stiffness", SOFTEST_N_M, 1e6, "N/m"),
+    ("wall.stiffness", SOFTEST_N_M, 2e5, "N/m"),
     ("device.mass", 1e-4, 10.0, "kg"),
     ("encoder.resolution", 1e-10, 1e-3, "m"),
     ("noise.deviation", 1e-10, 1e-3, "m"),
