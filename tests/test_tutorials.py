@@ -16,14 +16,16 @@ import pytest
 
 from haploop.tools.sweep.table import read as read_table
 from helpers.documented import LIVE, Block, blocks, commands
-from helpers.live.launched import HAPLOOP, PATIENCE_S, wait_for
+from helpers.live.launched import HAPLOOP, PATIENCE_S, PATIENT, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.long]
 
 HOUSE = Path(__file__).parents[1]
 TUTORIALS = HOUSE / "docs/tutorials"
 # A run that others are to meet goes on for long enough, in real time; it is stopped at the end of its block.
-GOES_ON = ("--set", "duration=600", "--pace", "1")
+GOES_ON = ("--set", "duration=600", "--pace", "1", "--set", PATIENT)
+# A command may have to compile, and a sweep takes half a minute on a machine with nothing else to do.
+COMMAND_PATIENCE_S = 900.0
 # What waits for the next run, or for the page of a run to be closed, is ended by Ctrl-C.
 STAYS = {"--view", "plotjuggler"}
 # What takes minutes is left out.
@@ -108,7 +110,9 @@ class Reader:
         wait_for("the run", lambda: "controller" in self._call(["status"]).stdout)
         joined = [one for one in live if one[0] == "attach"]
         for one in joined:
-            self._starts(one)
+            self._starts([*one, "--port", "0"] if "plotjuggler" in one else one)
+            role = {"logger": "recorder"}.get(one[1], one[1])
+            wait_for(f"the {role}", lambda role=role: role in self._call(["status"]).stdout)
         for one in live:
             if one[0] not in ("attach", "stop"):
                 self.runs(one)
@@ -136,7 +140,7 @@ class Reader:
         given = [*HAPLOOP, *words]
         return subprocess.run(given, cwd=self.folder, capture_output=True, text=True, timeout=patience_s)
 
-    def runs(self, words: list[str], patience_s: float = PATIENCE_S) -> str:
+    def runs(self, words: list[str], patience_s: float = COMMAND_PATIENCE_S) -> str:
         """Runs a command to its end, which must be in order; ``runs/...`` is the last run there is."""
         made = sorted(self.folder.glob("runs/*/log.mcap"), key=os.path.getmtime)
         given = [str(made[-1].parent) if word == "runs/..." else word for word in words]

@@ -94,7 +94,7 @@ def test_swings_of_the_independent_loop_without_friction_die_below_the_limit_of_
 ):
     limit = formulas(loop_of("omega3"))[-1].stiffness_N_m
     of, holds = in_corners(DEVICES["omega3"], np.array([1.0]))
-    of.friction, of.count = 0.0 * holds, 1e-9 + 0.0 * holds
+    of = of._replace(friction=0.0 * holds, count=1e-9 + 0.0 * holds)
     x = press(of, holds, share * limit, {}, sway=0.0, speed=0.005)[0][:, 0]
     early, late = (np.ptp(np.diff(x[begin : begin + 300])) for begin in (500, 2500))
     assert late > early if lasts else late < 0.5 * early

@@ -170,7 +170,7 @@ def test_a_logger_whose_run_vanishes_ends_by_itself_and_its_log_reads(running, a
     run.end(-signal.SIGKILL)
     second.end(1)
     assert "has ended without a word" in second.stderr
-    assert not alive(list(run.nodes.values()))
+    wait_for("the end of the nodes", lambda: not alive(list(run.nodes.values())))
     assert not haploop.logger.read(second.out).truncated
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from haploop.launch.processes import run_directory
 from haploop.launch.runs.replay import replay
-from helpers.live.launched import LONG, alive, wait_for
+from helpers.live.launched import BRIEF, LONG, alive, wait_for
 from helpers.scenes.brake import source
 
 BREAKS = {
@@ -156,7 +156,7 @@ def test_a_change_that_hangs_in_the_controller_alone_is_refused_at_its_tick_and_
     """As no trial elsewhere can find out. Who asked is told so, too, unless that takes a busy machine 3 s."""
     plugin = tmp_path / "brake.py"
     plugin.write_text(source())
-    run = running("--plugin", str(plugin), scene=scene, sets=(*LONG, "run.deadline=1.5"))
+    run = running("--plugin", str(plugin), scene=scene, sets=(*LONG, BRIEF))
     run.reaches(100)
     there = "sys.argv[0].endswith(os.path.join('controller', 'node.py'))"
     plugin.write_text(source(at_making=f"time.sleep(1000) if {there} else None"))

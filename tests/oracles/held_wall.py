@@ -1,22 +1,24 @@
 """A device held to a wall by a swaying hand, written by hand: bodies, cable, grip, dry friction, encoder, elements.
 
 It uses nothing of the code it judges: semi-implicit Euler steps of 50 us, friction as the impulse that stops a body, a
-buzz of motion or force found from turning points instead of spectra. All holds in all corners are columns of one array.
+buzz of motion or force found from turning points instead of spectra. All holds in all corners are columns of one array,
+each computed by a loop that numba compiles.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import pytest
+
+numba = pytest.importorskip("numba")
 
 STEP_S, PERIOD_S, LASTS_S = 5e-5, 1e-3, 3.0
 STEPS = round(PERIOD_S / STEP_S)
 
 
-@dataclass
-class Bodies:
+class Bodies(NamedTuple):
     """One device and hand; in ``press`` every number may be an array over the members. SI units."""
 
     mass: Any
@@ -59,7 +61,7 @@ _SCALED = (
 )
 # With less of these, walls bear less: half of the corners taken have little of all of them.
 _HOLDS = {"friction", "damping", "motor_damping", "cable_damping"}
-_NUMBERS = [field.name for field in fields(Bodies) if field.name != "delay_s"]
+_NUMBERS = Bodies._fields[:-1]
 # What a preset assumes of its device.
 ASSUMED = {
     "premium15_cable": ("motor_mass", "motor_damping", "cable_stiffness", "cable_damping"),
@@ -96,7 +98,7 @@ def in_corners(
 
 def columns(of: Bodies, some: np.ndarray) -> Bodies:
     """Returns some of the members, by their places."""
-    return replace(of, **{name: getattr(of, name)[some] for name in _NUMBERS})
+    return of._replace(**{name: getattr(of, name)[some] for name in _NUMBERS})
 
 
 def press(
@@ -107,49 +109,62 @@ def press(
 
     Stiffness, elements by kind, and the hand's values are single numbers, or one for each member.
     """
-    members, ticks = len(holds), round(lasts_s / PERIOD_S)
-    has_cable, h = bool(np.any(of.motor_mass)), STEP_S
-    x = np.full(members, 2e-4)
-    v = -speed + np.zeros(members)
-    y, w, xm, vm = x.copy(), v.copy(), x.copy(), v.copy()
-    late = round(of.delay_s / h)
-    commands = [np.zeros(members)]
-    counted = acceleration = velocity = None
-    xs, counts, forces = np.zeros((3, ticks, members))
-    first_mass = of.motor_mass if has_cable else of.mass
-    for tick in range(ticks):
-        at = xm if has_cable else x
-        count = np.rint(at / of.count)
-        before = count if counted is None else counted
-        now = (count - before) * of.count / PERIOD_S
-        a = (now - (now if velocity is None else velocity)) / PERIOD_S
-        a_before = np.zeros(members) if acceleration is None else acceleration
-        element = -elements.get("damping", 0.0) * now - elements.get("bidirectional-inertia", 0.0) * a
-        element -= np.where(now * a_before >= 0.0, elements.get("unidirectional-inertia", 0.0) * a, 0.0)
-        command = np.where(count < 0, -stiffness * count * of.count + element, 0.0)
-        counted, velocity, acceleration = count, now, a
-        commands.append(np.clip(command, -of.most_force, of.most_force))
-        xs[tick], counts[tick], forces[tick] = at, count, command
-        hand = -holds * (1.0 + sway * np.sin(2.0 * np.pi * sway_Hz * tick * PERIOD_S))  # slow beside a tick
-        for step in range(STEPS):
-            k = tick * STEPS + step
-            acting = (k - late) // STEPS
-            u = commands[acting + 1] if acting >= 0 else commands[0]
-            grip = of.grip_stiffness * (y - x) + of.grip_damping * (w - v)
-            w = w + h * (hand - grip - of.hand_stiffness * y - of.hand_damping * w) / of.hand_mass
-            if has_cable:
-                cable = of.cable_stiffness * (xm - x) + of.cable_damping * (vm - v)
-                v = v + h * (grip + cable - of.damping * v) / of.mass
-                vm = _rubbed(vm + h * (u - cable - of.motor_damping * vm) / first_mass, of.friction * h / first_mass)
-                xm = xm + h * vm
-            else:
-                v = _rubbed(v + h * (grip + u - of.damping * v) / first_mass, of.friction * h / first_mass)
-            x, y = x + h * v, y + h * w
+    members = len(holds)
+    each = lambda value: np.ascontiguousarray(np.broadcast_to(np.asarray(value, float), members))  # noqa: E731
+    sizes = [elements.get(kind, 0.0) for kind in ("damping", "bidirectional-inertia", "unidirectional-inertia")]
+    of = Bodies(*map(each, of[:-1]), delay_s=of.delay_s)
+    given = [*map(each, (holds, stiffness, *sizes, sway, sway_Hz, speed))]
+    seen = np.zeros((3, members, round(lasts_s / PERIOD_S)))
+    for member in range(members):
+        _press_one(of, member, *(each[member] for each in given), *seen[:, member])
+    xs, counts, forces = seen.swapaxes(1, 2)
     return xs, counts, forces
 
 
-def _rubbed(v: np.ndarray, most: np.ndarray) -> np.ndarray:
-    return np.sign(v) * np.maximum(np.abs(v) - most, 0.0)
+@numba.njit
+def _press_one(
+    of: Bodies, at: int, hold: float, stiffness: float, b: float, m: float, one_way_m: float, sway: float,
+    sway_Hz: float, speed: float, xs: np.ndarray, counts: np.ndarray, forces: np.ndarray,
+) -> None:  # fmt: skip
+    """Fills in the ticks of one member; ``b``, ``m`` and ``one_way_m`` are the sizes of its elements."""
+    h, has_cable, late = STEP_S, of.motor_mass[at] > 0.0, round(of.delay_s / STEP_S)
+    first_mass = of.motor_mass[at] if has_cable else of.mass[at]
+    most_dv = of.friction[at] * h / first_mass
+    x, v = 2e-4, -speed
+    y, w, xm, vm = x, v, x, v
+    commands = np.zeros(len(xs) + 1)
+    counted = velocity = acceleration = 0.0
+    for tick in range(len(xs)):
+        place = xm if has_cable else x
+        count = np.rint(place / of.count[at])
+        now = (count - counted) * of.count[at] / PERIOD_S if tick else 0.0
+        a = (now - velocity) / PERIOD_S if tick else 0.0
+        element = -b * now - m * a
+        if now * acceleration >= 0.0:  # the inertia that acts one way looks at the acceleration of the tick before
+            element -= one_way_m * a
+        command = -stiffness * count * of.count[at] + element if count < 0 else 0.0
+        counted, velocity, acceleration = count, now, a
+        commands[tick + 1] = min(max(command, -of.most_force[at]), of.most_force[at])
+        xs[tick], counts[tick], forces[tick] = place, count, command
+        hand = -hold * (1.0 + sway * np.sin(2.0 * np.pi * sway_Hz * tick * PERIOD_S))  # slow beside a tick
+        for step in range(STEPS):
+            acting = (tick * STEPS + step - late) // STEPS
+            u = commands[acting + 1] if acting >= 0 else 0.0
+            grip = of.grip_stiffness[at] * (y - x) + of.grip_damping[at] * (w - v)
+            w += h * (hand - grip - of.hand_stiffness[at] * y - of.hand_damping[at] * w) / of.hand_mass[at]
+            if has_cable:
+                cable = of.cable_stiffness[at] * (xm - x) + of.cable_damping[at] * (vm - v)
+                v += h * (grip + cable - of.damping[at] * v) / of.mass[at]
+                vm = _rubbed(vm + h * (u - cable - of.motor_damping[at] * vm) / first_mass, most_dv)
+                xm += h * vm
+            else:
+                v = _rubbed(v + h * (grip + u - of.damping[at] * v) / first_mass, most_dv)
+            x, y = x + h * v, y + h * w
+
+
+@numba.njit
+def _rubbed(v: float, most: float) -> float:
+    return np.sign(v) * max(abs(v) - most, 0.0)
 
 
 def buzzes(

@@ -30,20 +30,20 @@ class Late(Element):
 
 
 @pytest.mark.parametrize(
-    ("at_350", "word", "says"),
+    ("at_350", "deadline_s", "word", "says"),
     [
-        ("pass", "steady", ""),
-        ("time.sleep(1000)", "undecided", "its plugins did not return within 0.8 s"),
-        ("os._exit(3)", "undecided", "ended with status 3"),
-        ("raise ValueError('enough')", "undecided", "ValueError: enough"),
+        ("pass", 30, "steady", ""),
+        ("time.sleep(1000)", 0.2, "undecided", "its plugins did not return within 0.8 s"),
+        ("os._exit(3)", 30, "undecided", "ended with status 3"),
+        ("raise ValueError('enough')", 30, "undecided", "ValueError: enough"),
     ],
 )
 def test_code_that_hangs_dies_or_raises_while_it_is_judged_leaves_the_verdict_undecided_and_says_why(
-    tmp_path: Path, at_350: str, word: str, says: str
+    tmp_path: Path, at_350: str, deadline_s: float, word: str, says: str
 ) -> None:
     path = tmp_path / "late.py"
     path.write_text(LATER.format(at_350=at_350))
-    tables = LEAST | pressed(duration=0.3, run={"deadline": 0.2}, dissipation=[{"kind": "late"}])
+    tables = LEAST | pressed(duration=0.3, run={"deadline": deadline_s}, dissipation=[{"kind": "late"}])
     found = judge_elsewhere(resolve(Layers(tmp_path / "scene.toml", tables), registry([path])), [path], [])
     assert found.word == word
     assert says in found.detail

@@ -40,9 +40,10 @@ if TYPE_CHECKING:
 # pinned, the number of the run, and the foreign programs that take the place of its own.
 Start = Callable[[Path, Callable[[str], Message], bool, int, Mapping[str, Program]], dict[str, Child]]
 
-# After a node has failed, in s: nodes heard from within the first time have the second to hand over their last blocks;
-# then the logger has the third to save its files, which on a busy machine takes a while.
-_SILENT_S, _HANDING_S, _SAVING_S = 0.5, 1.0, 2.0
+# After a node has failed, in s at the usual deadline, and in proportion more at a longer one, which is given on busy
+# machines: nodes heard from within the first time have the second to hand over their last blocks; then the logger has
+# the third to save its files.
+_SILENT_S, _HANDING_S, _SAVING_S, _USUAL_DEADLINE_S = 0.5, 1.0, 2.0, 5.0
 # Time between looks at silent nodes; commands, reports and deaths are noticed at once.
 _LOOK_MS = 100
 
@@ -242,18 +243,19 @@ class Supervisor:
     def _save(self, reason: str) -> None:
         """Has the nodes that answer hand their last blocks to the logger, ends them, and lets it write what it has."""
         roster, loop = self._server.roster, [child for role, child in self._children.items() if role != "logger"]
-        lost = {node.role for node in roster.silent(self._machine.now(), _SILENT_S)}
+        patience = max(1.0, self._spec.scene.run.deadline / _USUAL_DEADLINE_S)
+        lost = {node.role for node in roster.silent(self._machine.now(), patience * _SILENT_S)}
         lost |= {child.role for child in loop if child.wait(0.0)}
         if (logger := roster.own("logger")) and not self._children["logger"].wait(0.0):
             for child in loop:
                 if child.role in lost:
                     child.kill()
             self._server.abort(reason, but=logger)
-            given_up = self._machine.now() + _HANDING_S
+            given_up = self._machine.now() + patience * _HANDING_S
             for child in loop:
                 child.wait(max(0.0, given_up - self._machine.now()))
         for child in loop:
             child.kill()
         self._server.abort(reason)
         if logger:
-            self._children["logger"].wait(_SAVING_S)
+            self._children["logger"].wait(patience * _SAVING_S)
