@@ -49,7 +49,7 @@ def take_seat(name, version):
 
 def _end_with_launcher(seat):
     sys.stdin.read()
-    seat.hold(0.0)
+    seat.hold_nothing()
     os._exit(1)
 
 
@@ -62,7 +62,8 @@ class Seat:
     """
 
     def __init__(self, directory, start, program, is_external):
-        self._sockets, self.hold = Sockets(directory, start["transport"]), lambda force: None
+        self._sockets, self._device_holds = Sockets(directory, start["transport"]), lambda force: None
+        self._holding = threading.Lock()
         self._clock = Clock(self._sockets, start["address"])
         self._loop = Loop(self._sockets, start["secret"], lambda: self._clock.wait(self._tick, "controller"))
         self._publisher = self._sockets.open(zmq.XPUB)
@@ -90,6 +91,15 @@ class Seat:
                 self._flush()
                 self._clock.wait(self._tick, "clock")
 
+    def hold_nothing(self):
+        """Gives the device no force from now on, whatever the thread of the run still computes."""
+        self._holding.acquire()  # and never released
+        self._device_holds(0.0)
+
+    def _hold(self, force):
+        with self._holding:
+            self._device_holds(force)
+
     # The run
 
     def run(self, step, x, v, hold=lambda force: None):
@@ -99,14 +109,14 @@ class Seat:
             hold: called at every tick of a run whose plant owns the time, with the force from now on, N; and with 0
                 at the end, however the run ends.
         """
-        self.hold = hold
+        self._device_holds = hold
         try:
             if asked := _beyond(self.scene):
                 raise SeatError(f"This plant has one force in and one position out, but no {asked}; leave it out.")
             try:
                 self._work(step, float(x), float(v))
             finally:
-                hold(0.0)  # first of all
+                self._hold(0.0)  # first of all
         except Exception as error:
             self.fail(str(error) if isinstance(error, SeatError) else f"{type(error).__name__}: {error}")
         self._clock.say(DONE, self._tick, {"lateness": self._schedule.figures()} if self._owns_time else {})
@@ -196,7 +206,7 @@ class Seat:
         if reason := self._unusable():
             return reason
         self._take_due(self._tick * self._n)
-        self.hold(self._force)
+        self._hold(self._force)
         while self._loop.ready_by(self._schedule.due(self._tick + 1)):
             self._take_answer()
         return ""

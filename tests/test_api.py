@@ -147,10 +147,12 @@ def test_a_plugin_that_was_edited_is_loaded_anew_from_python(tmp_path: Path) -> 
 @pytest.mark.slow
 def test_watching_a_live_loop_shows_what_its_log_will_hold_and_leaving_it_ends_it(tmp_path: Path) -> None:
     with start(load("fig6b", SHORT), paused=True) as loop, ThreadPoolExecutor() as threads:
-        watching = threads.submit(lambda: list(loop.watch()))
+        seen = []
+        watching = threads.submit(lambda: [seen.append(block) for block in loop.watch()])
         wait_for("who watches", lambda: "observer" in {node["role"] for node in loop.status()["nodes"]})
+        wait_for("a block", lambda: seen or not loop.step(1))
         result = loop.finish()
-        seen = watching.result()
+        watching.result()
     assert result.directory is None
     logged = result["/controller"]
     for block in seen:

@@ -9,7 +9,7 @@ import pytest
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from helpers.live.launched import SCENE, wait_for
+from helpers.live.launched import SCENE, wait_for, wait_till_stays
 
 KINDS = registry()
 # It stands still at tick 500, so that it is surely still there when something joins it.
@@ -22,7 +22,8 @@ def printing(launched):
 
     def attach(run):
         printer = launched("attach", "print", "--run", run.live.id)
-        wait_for("the printer", lambda: [n for n in run.ask("status")["nodes"] if n["role"] == "print" and n["tick"]])
+        ticks = lambda: [n["tick"] for n in run.ask("status")["nodes"] if n["role"] == "print"]  # noqa: E731
+        wait_till_stays("the printer", ticks, [500])
         return printer
 
     return attach

@@ -18,7 +18,9 @@ from helpers.live.launched import HAPLOOP, PATIENCE_S, Launched, alive, first_an
 
 def seat_of(run: Launched, role: str = "controller") -> Path:
     """The file by which a program finds the run."""
-    return wait_for("the file", lambda: next(private_directory.base_directory().glob(f"*/external-{role}.json"), None))
+    named = f"*/external-{role}.json"
+    whole = lambda path: path.read_text().rstrip().endswith("}")  # noqa: E731
+    return wait_for("the file", lambda: next(filter(whole, private_directory.base_directory().glob(named)), None))
 
 
 def joined(seat: Path, *options: str) -> subprocess.Popen[bytes]:

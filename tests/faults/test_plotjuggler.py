@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 import signal
 import threading
-from functools import partial
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pytest
@@ -17,12 +16,16 @@ from haploop.logger.log.recording import Recording
 from haploop.tools.attach import plotjuggler
 from haploop.tools.attach.plotjuggler import Outlet, publish
 from helpers.live.in_process import ask
-from helpers.live.launched import PATIENCE_S, first_and_slowly, wait_for
+from helpers.live.launched import PATIENCE_S, first_and_slowly, wait_for, wait_till_stays
 from helpers.live.live_run import Going, going, undisturbed
 from oracles.plotjuggler_rules import Viewer
 
 END = "/end"
 ROWS_A_TICK = {"/plant": 10, "/controller": 1, "/energy": 1}
+
+
+def ticks_of_nodes(status: dict[str, Any]) -> list[int]:
+    return [node["tick"] for node in status["nodes"] if node["role"] == "plotjuggler"]
 
 
 class Node:
@@ -35,16 +38,7 @@ class Node:
 
     def joined(self, subject: Going, tick: int) -> None:
         """Wait until it stands at this tick, like everyone, and not only as it is greeted."""
-        stood = 0
-
-        def stands() -> bool:
-            nonlocal stood
-            nodes = subject.ask("status")[1]["nodes"]
-            here = [node["tick"] for node in nodes if node["role"] == "plotjuggler"] == [tick]
-            stood = stood + 1 if here else 0
-            return stood > 10
-
-        wait_for("the node", stands)
+        wait_till_stays("the node", lambda: ticks_of_nodes(subject.ask("status")[1]), [tick])
 
     def heard(self) -> None:
         """Wait until it knows that a viewer listens."""
@@ -147,8 +141,9 @@ def attached(launched, *arguments):
     return node, re.findall(r"tcp://127\.0\.0\.1:\d+", node.stderr)[0]
 
 
-def has_joined(run):
-    return [node for node in run.ask("status")["nodes"] if node["role"] == "plotjuggler" and node["tick"]]
+def has_joined(run, tick):
+    """Waits until the node stands with the run."""
+    wait_till_stays("the node", lambda: ticks_of_nodes(run.ask("status")), [tick])
 
 
 @pytest.mark.slow
@@ -162,7 +157,7 @@ def test_it_waits_for_a_run_survives_its_end_and_goes_on_with_the_next(running, 
             run_id = run.live.id
             node.says(f"run {run_id}: ")
             run.stands(100)
-            wait_for("the node", partial(has_joined, run))
+            has_joined(run, 100)
             run.ask("resume")
             run.summary()
             node.says(f"run {run_id} is over")
@@ -193,7 +188,7 @@ def test_stopped_for_long_it_costs_the_run_nothing_and_is_told_what_it_missed(ru
     run = running(sets=("duration=12", "run.block_ticks=10", "event=[{at=0.5, pause=true}]"), pace=())
     run.reaches(500)
     node, _ = attached(launched, "--run", run.live.id)
-    wait_for("the node", partial(has_joined, run))
+    has_joined(run, 500)
     node.signal(signal.SIGSTOP)
     run.ask("resume")
     summary = run.summary()

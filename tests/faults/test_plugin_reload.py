@@ -61,10 +61,13 @@ def test_time_goes_on_while_a_file_is_tried_and_other_commands_are_answered(runn
     plugin.write_text(source())
     run = running("--plugin", str(plugin), scene=scene)
     began = run.reaches(100)
-    plugin.write_text(source(f"while not Path({str(flag)!r}).exists(): time.sleep(0.01)").replace("-self", "-2 * self"))
+    here = tmp_path / "here"
+    waits = f"Path({str(here)!r}).touch()\nwhile not Path({str(flag)!r}).exists(): time.sleep(0.01)"
+    plugin.write_text(source(waits).replace("-self", "-2 * self"))
     said: list[dict[str, Any]] = []
     asking = threading.Thread(target=lambda: said.append(run.ask("swap", **SWAP, reload=True)))
     asking.start()
+    wait_for("the trial", here.exists)
     run.reaches(began + 200)
     with pytest.raises(run_directory.CommandRefused, match="another swap is being tried"):
         run.ask("swap", **SWAP)

@@ -68,7 +68,7 @@ def test_an_element_that_prints_leaves_the_run_and_its_bits_as_they_are(
     run = running("--plugin", str(plugin), scene=SCENES / "fig6a.toml", sets=SETS, pace=())
     assert run.summary()["trajectory_sha256"] == silent
     run.leaves_nothing()
-    assert len(run.stderr.splitlines()) < 40
+    assert len(run.stderr.splitlines()) < 150, "few of three hundred"
     assert "Traceback" not in run.stderr
 
 

@@ -116,7 +116,7 @@ def main():
     parser.add_argument("--dwell", action="store_true")
     parser.add_argument("--ticks", type=int)
     options = parser.parse_args()
-    signal.alarm(60)  # so that it is never left behind
+    signal.alarm(600)  # so that it is never left behind
     entry = json.loads(options.run.read_text(encoding="utf-8"))
     context = zmq.Context()
     clock = None if options.viewer else Clock(context, entry["clock"])

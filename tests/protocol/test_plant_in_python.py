@@ -45,7 +45,7 @@ class Sleeper(Element):
     def force(self, motion):
         ticks.append(motion)
         if len(ticks) == ASLEEP:
-            time.sleep(0.03)
+            time.sleep(SECONDS)
         return 0.1
 """
 TOLD = {"ticks": 3, "late_ticks": 1, "median_s": 1e-4, "percent_99_s": 1e-3, "percent_99_9_s": 1e-3, "most_s": 2e-3}
@@ -114,12 +114,14 @@ def test_without_late_answers_a_run_by_the_devices_time_has_the_bits_of_any_run(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("asleep", "least"), [(500, 20), (990, 7)], ids=["in the middle", "to the end"])
+@pytest.mark.parametrize(
+    ("asleep", "seconds", "least"), [(500, 0.2, 100), (990, 0.2, 7)], ids=["in the middle", "to the end"]
+)
 def test_an_answer_that_is_late_is_counted_and_the_device_is_without_force_for_that_period(
-    asleep: int, least: int, tmp_path: Path
+    asleep: int, seconds: float, least: int, tmp_path: Path
 ) -> None:
     """Those that were due before the end of the run, and came after it, too."""
-    (tmp_path / "sleeper.py").write_text(SLEEPER.replace("ASLEEP", str(asleep)))
+    (tmp_path / "sleeper.py").write_text(SLEEPER.replace("ASLEEP", str(asleep)).replace("SECONDS", str(seconds)))
     alone = 'dissipation=[{kind="sleeper", acts="always"}]', "wall.stiffness=0"
     summary, log = ran(tmp_path / "out", *alone, plugins=(tmp_path / "sleeper.py",), **BY_PLANT, **plant())
     late, forces = summary["lateness"]["late_ticks"], np.asarray(log["/plant"]["force"])[20:-1]
@@ -179,7 +181,7 @@ def test_a_device_is_given_no_force_when_the_launcher_is_killed(tmp_path: Path) 
 @pytest.mark.slow
 def test_who_attaches_and_hangs_does_not_hold_a_device_up(tmp_path: Path) -> None:
     observer = HOUSE / "tests/oracles/plain_observer.py"
-    with going(tmp_path, "duration=6", "run.deadline=5", **BY_PLANT, **plant()) as live:
+    with going(tmp_path, "duration=6", "run.deadline=5", "run.window_blocks=20", **BY_PLANT, **plant()) as live:
         command = [sys.executable, str(observer), str(live.run_json), "--dwell"]
         with subprocess.Popen(command, stdout=subprocess.DEVNULL) as attached:
             try:
@@ -196,7 +198,7 @@ def test_a_plant_in_python_takes_a_seat_that_waits_for_it(tmp_path: Path, tcp: s
     transport = Transport.from_options(tcp, tmp_path / "keys" if guarded else None)
     with going(tmp_path, "duration=1", programs=read_programs([], ["plant"]), transport=transport) as live:
         told = live.run_json.with_name("external-plant.json")
-        wait_for("the seat", told.exists)
+        wait_for("the seat", lambda: told.exists() and told.read_text().rstrip().endswith("}"))
         subprocess.run([sys.executable, *map(str, PLAIN), str(told)], check=True, timeout=PATIENCE_S)
         summary = live.result()
     assert summary["ticks"] == 1000

@@ -16,7 +16,7 @@ from haploop.tools.cli.live_runs import LiveRuns
 from haploop.view.receive.run_session import RunSession
 from helpers.live.browsing import site, to_its_end
 from helpers.live.followed import follow, same, whole
-from helpers.live.launched import PATIENCE_S, first_and_slowly
+from helpers.live.launched import PATIENCE_S, first_and_slowly, wait_for
 from helpers.live.live_run import going
 
 
@@ -115,10 +115,8 @@ def test_the_next_run_is_taken_up_and_the_first_stays_on_show_until_then(tmp_pat
 
     def one_run(tab, directory, title):
         with going(directory, "duration=0.3", "wall.position=-0.001", title, pauses=(100,)) as run:
-            for _ in range(2000):
-                if (tab.state or {}).get("run") == run.live.id:
-                    break
-                run.stands_at(100)
+            wait_for("the page", lambda: (tab.state or {}).get("run") == run.live.id)
+            run.stands_at(100)
             run.ask("resume")
             run.result()
 

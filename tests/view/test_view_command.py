@@ -18,6 +18,8 @@ from helpers.live.in_process import ask
 from helpers.live.launched import HAPLOOP, PATIENCE_S, SCENE, Launched, alive, command, processes, wait_for
 from helpers.live.live_run import going, undisturbed
 
+# The run stands still before its first tick until a test resumes it.
+STANDS = ("--set", "event=[{at=0, pause=true}]")
 LINK = re.compile(r"(http://127\.0\.0\.1:\d+)/#token=(\S+)")
 
 
@@ -102,7 +104,7 @@ def test_the_browser_is_opened_with_a_link_that_holds_no_token(launched, tmp_pat
 def test_run_with_view_serves_the_run_and_stays_until_ctrl_c(launched, tmp_path, monkeypatch):
     """In real time; the run ends, the page shows its summary, and the viewer goes with the launcher."""
     monkeypatch.delenv("DISPLAY", raising=False)
-    words = ["--set", "duration=0.5", "--set", "event=[{at=0, pause=true}]", "--view", "--json"]
+    words = ["--set", "duration=0.5", *STANDS, "--view", "--json"]
     run = launched("run", str(SCENE), *words, out=tmp_path / "out")
 
     async def play(tab: Tab) -> dict[str, Any]:
@@ -124,10 +126,12 @@ def test_run_with_view_serves_the_run_and_stays_until_ctrl_c(launched, tmp_path,
 @pytest.mark.slow
 def test_run_with_view_ends_with_its_page_where_asked(launched, tmp_path, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
-    words = ["--set", "duration=0.5", "--view", "--until-closed", "--name", "mine", "--json"]
+    words = ["--set", "duration=0.5", *STANDS, "--view", "--until-closed", "--name", "mine", "--json"]
     run = launched("run", str(SCENE), *words, out=tmp_path / "out")
 
     async def play(tab: Tab) -> dict[str, Any]:
+        await tab.phase("paused")
+        assert (await tab.ask("resume"))[0]
         return await tab.phase("ended")
 
     assert browse(run, play)["summary"]["title"] == "mine"
@@ -176,11 +180,14 @@ def test_a_viewer_that_cannot_start_is_no_matter_to_its_run(tmp_path):
 
 @pytest.mark.slow
 def test_a_viewer_that_dies_is_no_matter_to_its_run(launched, tmp_path):
-    run = launched("run", str(SCENE), "--set", "duration=2", "--view", out=tmp_path / "out")
+    run = launched("run", str(SCENE), "--set", "duration=600", *STANDS, "--view", out=tmp_path / "out")
     link(run)
     viewers = [pid for pid, parent, _, args in processes() if parent == run.pid and " view " in args]
     assert len(viewers) == 1
     os.kill(viewers[0], signal.SIGKILL)
+    wait_for("the end of the viewer", lambda: not alive(viewers))
+    assert run.is_there()
+    run.signal(signal.SIGINT)
     run.end(0)
 
 
@@ -267,10 +274,10 @@ def stopped_until(launched, tmp_path, tick: int, *overrides: str, **options: Any
 @pytest.mark.slow
 def test_a_stopped_viewer_costs_the_run_nothing_and_is_told_what_it_missed(launched, tmp_path):
     """At free pace; blocks of a tick fill its queues in no time."""
-    stopped_until(launched, tmp_path, 2200, "duration=2.5", "run.block_ticks=1", "run.log=ticks")
+    stopped_until(launched, tmp_path, 2200, "duration=3", "run.block_ticks=1", "run.log=ticks")
 
 
 @pytest.mark.slow
 def test_a_viewer_stopped_in_real_time_costs_the_run_nothing(launched, tmp_path):
     """Blocks of a tick fill its queues in two seconds."""
-    stopped_until(launched, tmp_path, 2200, "duration=2.5", "run.block_ticks=1", pace=1.0)
+    stopped_until(launched, tmp_path, 2200, "duration=3", "run.block_ticks=1", pace=1.0)

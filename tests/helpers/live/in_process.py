@@ -62,7 +62,7 @@ def at_most(seconds: float) -> Iterator[None]:
             signal.signal(number, before[number])
 
 
-def ask(*words: str, seconds: float = 30.0) -> Answer:
+def ask(*words: str, seconds: float = 300.0) -> Answer:
     """Runs ``haploop WORDS`` to its end."""
     streams = io.BytesIO(), io.BytesIO()
     stdout, stderr = (io.TextIOWrapper(raw, "utf-8", write_through=True) for raw in streams)

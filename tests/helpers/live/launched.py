@@ -57,6 +57,17 @@ def wait_for(what: str, look: Callable[[], Any]) -> Any:
     return answer
 
 
+def wait_till_stays(what: str, look: Callable[[], Any], value: Any) -> None:
+    """Waits until ``look`` gives a value eleven times in a row: a node that is greeted has the tick of the run, too."""
+    found: list[bool] = []
+
+    def stays() -> bool:
+        found.append(look() == value)
+        return len(found) > 10 and all(found[-11:])
+
+    wait_for(what, stays)
+
+
 def processes() -> list[Row]:
     """(pid, parent, state, command line) of every process; with ``-ww`` no line is cut at a terminal's width."""
     listing = subprocess.run(

@@ -20,7 +20,7 @@ from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.wire import Message
 
 # Time, s, that a foreign program is given after the end of its stdin to bring its device to rest.
-_TO_REST_S = 0.1
+_TO_REST_S = 0.5
 MARK = "HAPLOOP_SEAT"
 # Time, s, that the search for processes that have left the group may take.
 _GUARD_S = 5.0
@@ -115,7 +115,7 @@ class Child:
     def kill(self) -> None:
         """Ends the process, stopped or not, and reaps it; a second call does nothing.
 
-        One of the run's own ends now, a foreign program 0.1 s after the end of its stdin.
+        One of the run's own ends now, a foreign program 0.5 s after the end of its stdin.
         """
         if self.died < 0:  # its descriptor's number may have another owner by now, such as a ZeroMQ connection
             return
@@ -136,7 +136,7 @@ class Child:
 class _Group:
     """A process group for a foreign program: all of it ends with the launcher, whatever the program does.
 
-    The first process of the group waits for a word on its stdin, which the launcher holds open, or until 0.1 s after
+    The first process of the group waits for a word on its stdin, which the launcher holds open, or until 0.5 s after
     the end of stdin. It then kills the group and, where there is /proc, also the processes that have left the group but
     kept a mark in their environment.
 

@@ -30,7 +30,7 @@ _STAYS = "The run is over; its page {} until {}."
 _UNTIL = ("Ctrl-C ends it here", "it is closed, or Ctrl-C ends it here")
 _GONE = "The page is gone; the run continues. If it stands still, haploop resume continues it, Ctrl-C ends it."
 # How long a run waits for its viewer.
-_HELD_S = 10.0
+_HELD_S = 20.0
 # A viewer yields the processor to a run.
 _NICE = 10
 
