@@ -108,7 +108,7 @@ def play(seed: int) -> tuple[list[str], str, tuple[float, float] | None]:
     dice = random.Random(seed)
     kinds = dice.sample(KINDS, dice.choice((1, 2)))
     options, sets, excuses = list(dice.choice(((), ("--pace", "3")))), list(_SETS), list[str]()
-    deadline_s = dice.choice((0.7, 5.0)) if any("stopped" in kind or "hangs" in kind for kind in kinds) else 5.0
+    deadline_s = dice.choice((0.7, 5.0)) if any("stopped" in kind or "hangs" in kind for kind in kinds) else 30.0
     if deadline_s < 2.0:  # on a busy machine anybody may be silent for so long
         excuses.append(f"has not answered for {deadline_s:g} s")
     disk_bytes = dice.randint(10_000, 1_500_000) if _FULL in kinds else None
