@@ -9,11 +9,13 @@ import re
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from haploop.launch.processes import run_directory
 from haploop.tools.sweep.table import read as read_table
 from helpers.documented import LIVE, Block, blocks, commands
 from helpers.live.launched import HAPLOOP, PATIENCE_S, PATIENT, wait_for
@@ -45,6 +47,14 @@ def text_of(document: Path) -> str:
 
 
 README = text_of(HOUSE / "README.md")
+
+
+def nodes() -> list[str]:
+    """The roles of the nodes of the run that is live; none if there is none yet, or no more."""
+    with suppress(run_directory.RunNotFound, run_directory.CommandRefused):
+        _, status = run_directory.ask(run_directory.find(None), "status")
+        return [node["role"] for node in status["nodes"]]
+    return []
 
 
 class Reader:
@@ -107,17 +117,17 @@ class Reader:
 
     def _steers(self, run: list[str], live: list[list[str]]) -> None:
         self._starts([*run, *GOES_ON])
-        wait_for("the run", lambda: "controller" in self._call(["status"]).stdout)
+        wait_for("the run", lambda: "controller" in nodes())
         joined = [one for one in live if one[0] == "attach"]
         for one in joined:
+            before = len(nodes())
             self._starts([*one, "--port", "0"] if "plotjuggler" in one else one)
-            role = {"logger": "recorder"}.get(one[1], one[1])
-            wait_for(f"the {role}", lambda role=role: role in self._call(["status"]).stdout)
+            wait_for(" ".join(one), lambda before=before: len(nodes()) > before)
         for one in live:
             if one[0] not in ("attach", "stop"):
                 self.runs(one)
         self.runs(["stop"])
-        wait_for("the end of the run", lambda: "controller" not in self._call(["status"]).stdout)
+        wait_for("the end of the run", lambda: not nodes())
         for words, process in self._going:
             said = self._told(words)
             if "--view" in words:
