@@ -1,9 +1,11 @@
 """The figure of an advice: every mark has its number, nothing has a length, and both panels share an axis."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from haploop.tools.advise.figure import figure_of
 from haploop.tools.advise.search import fallen
@@ -11,10 +13,17 @@ from haploop.tools.advise.walls.store import Failure
 from haploop.tools.advise.withstand import Rival
 from helpers.data.advices import ADVICE, DAMPED, ONE, TWO, changed
 
+WIDE = "Common Mass of a Wrist Motor, " * 3
+LONG = replace(
+    ADVICE, name=WIDE, tried_by=WIDE, not_varied=(WIDE,), uncertain={WIDE: (0.8, 1.2)}, hand=(0.269, 6.43, 105.0),
+    grip=(3.6, 552.0), provisos=(WIDE, WIDE),
+)  # fmt: skip
+
 
 @pytest.fixture(scope="module")
 def panels():
-    return figure_of(ADVICE).get_axes()
+    walls, _, changes = figure_of(ADVICE).get_axes()
+    return walls, changes
 
 
 def beside(ax, row):
@@ -34,6 +43,23 @@ def test_what_withstood_the_attack_stands_beside_what_holds_in_every_corner_and_
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("advice", [ADVICE, LONG], ids=["usual", "long words"])
+def test_all_that_is_written_is_within_the_figure_and_the_answer_overlaps_nothing(advice):
+    figure = figure_of(advice)
+    figure.draw_without_rendering()
+    whole, (walls, between, changes) = figure.bbox, figure.get_axes()
+    of_rows = [label for ax in (walls, changes) for label in ax.get_yticklabels()]
+    written = [text for ax in figure.get_axes() for text in (*ax.texts, ax._left_title, ax.xaxis.label)] + of_rows
+    for text in filter(Text.get_text, written):
+        place = text.get_window_extent()
+        assert whole.x0 <= place.x0 < place.x1 <= whole.x1, text.get_text()
+        assert whole.y0 <= place.y0 < place.y1 <= whole.y1, text.get_text()
+    lines = [text.get_window_extent() for text in between.texts]
+    assert max(line.y1 for line in lines) < walls.xaxis.get_tightbbox().y0
+    assert min(line.y0 for line in lines) > changes._left_title.get_window_extent().y1
+    assert not any(one.overlaps(other) for one, other in combinations(lines, 2))
+
+
 def test_the_panel_of_changes_says_that_the_element_is_tuned_anew_and_which_column_is_without_one(panels):
     assert panels[1].get_title(loc="left").endswith("in the hardest corners, with the element tuned again")
     assert beside(panels[1], -0.85)[1:] == ["element", "without"]
@@ -45,7 +71,7 @@ def test_an_element_that_was_not_attacked_has_no_number_there_however_much_it_be
 
 def test_a_wall_far_softer_than_the_others_is_an_arrow_at_the_end_of_the_axis_and_does_not_stretch_it():
     soft = replace(ADVICE, without=(changed("no friction", 2.0, 2.0),))
-    walls, changes = figure_of(soft).get_axes()
+    walls, _, changes = figure_of(soft).get_axes()
     assert changes.get_xlim() == walls.get_xlim() == (0.02, 10.0)
     assert beside(changes, 1) == ["", "2.0 N/m", "2.0 N/m"]
     arrows = [line for line in changes.lines if line.get_marker() == "<"]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from haploop.tools.advise.advice import Advice
-from haploop.tools.advise.report import format_attacked, format_limit, format_stiffness, moves, sentences
+from haploop.tools.advise.report import answer, format_attacked, format_limit, format_stiffness, moves
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.withstand import WORTH
 from haploop.tools.figure import style
@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH_IN, _ROW_IN, _BESIDE_IN = 11.0, 0.37, 1.6
-_LETTERS = 118
+# Of the answer: letters of its headline and of other lines, the height of a line, and, in the figure's widths, where
+# names end and lines begin.
+_HEADLINE_LETTERS, _LETTERS, _LINE_IN, _NAMES_END, _LINES_BEGIN = 130, 124, 0.2, 0.12, 0.128
+_NAME_LETTERS = 60
 _DOT = 7.0
 _LIGHT, _HALF, _SOFTER = "white", "#9CC3E0", "#B07A45"
 # Right ends of the columns of numbers beside the axes, in points.
@@ -39,7 +42,8 @@ def draw(told: Advice, target: Path) -> Path:
 def figure_of(told: Advice) -> Figure:
     """Makes two panels: the limits of every element with formulas and published values, and those of changed devices.
 
-    Dots on one logarithmic axis, on which the length of a bar would mean nothing; the numbers stand beside it.
+    Dots on one logarithmic axis, on which the length of a bar would mean nothing; the numbers stand beside it. The
+    answer in words stands between the panels.
 
     Raises FigureError where matplotlib is missing.
     """
@@ -48,14 +52,15 @@ def figure_of(told: Advice) -> Figure:
     others = [(row.words, row.limit, row.alone if has_element else None) for row in changed]
     for of, half, double in (row for row in told.assumed if moves(row[1], row[2], told.unchanged.limit)):
         others += [(f"{of.key} halved (assumed)", half, None), (f"{of.key} doubled (assumed)", double, None)]
-    lines = [line for sentence in sentences(told) for line in textwrap.wrap(sentence, _LETTERS)]
-    heights = [
-        (len(told.found.bests) + len(told.formulas) + len(told.published)) * _ROW_IN + _BESIDE_IN + 0.2 * len(lines),
-        len(others) * _ROW_IN + _BESIDE_IN,
-    ]
+    headline = textwrap.wrap(told.headline, _HEADLINE_LETTERS)
+    lines = [(name, textwrap.wrap(f"{words.rstrip('.')}.", _LETTERS)) for name, words in answer(told)]
+    rows = len(told.found.bests) + len(told.formulas) + len(told.published)
+    height_in = (len(headline) + sum(len(wrapped) for _, wrapped in lines)) * _LINE_IN
+    heights = [rows * _ROW_IN + _BESIDE_IN, height_in, len(others) * _ROW_IN + _BESIDE_IN]
     figure = style.empty_figure(_WIDTH_IN, sum(heights))
-    above, below = figure.subplots(2, 1, height_ratios=heights)
-    stiffnesses = [_walls(above, told, lines), _changes(below, told, others)]
+    above, between, below = figure.subplots(3, 1, height_ratios=heights)
+    _answer(between, headline, lines)
+    stiffnesses = [_walls(above, told), _changes(below, told, others)]
     for ax in (above, below):
         ax.set_xlim(*_ends([value / 1e3 for values in stiffnesses for value in values]))
         ax.set_xscale("log")
@@ -64,7 +69,27 @@ def figure_of(told: Advice) -> Figure:
     return figure
 
 
-def _walls(ax: Axes, told: Advice, lines: list[str]) -> list[float]:
+def _answer(ax: Axes, headline: list[str], lines: list[tuple[str, list[str]]]) -> None:
+    """Writes the answer across the figure: its headline, then every name with its lines."""
+    from matplotlib.transforms import blended_transform_factory
+
+    across = blended_transform_factory(ax.get_figure(root=True).transFigure, ax.transData)
+    look = {"transform": across, "va": "center", "fontsize": style.TEXT, "in_layout": False}
+    row = 0
+    for line in headline:
+        ax.text(_NAMES_END / 12, row, line, color=style.INK, fontweight="bold", **look)
+        row += 1
+    for place, (name, wrapped) in enumerate(lines):
+        weight, colour = ("normal", style.GREY) if place else ("bold", style.INK)
+        ax.text(_NAMES_END, row, name, color=style.INK, ha="right", fontweight=weight, **look)
+        for line in wrapped:
+            ax.text(_LINES_BEGIN, row, line, color=colour, fontweight=weight, **look)
+            row += 1
+    ax.set_ylim(row - 0.5, -0.5)
+    ax.set_axis_off()
+
+
+def _walls(ax: Axes, told: Advice) -> list[float]:
     """Marks the loop as described, every corner, and what is known; returns the stiffnesses, N/m."""
     names, marked = [], []
     for row, best in enumerate(told.found.bests):
@@ -81,7 +106,7 @@ def _walls(ax: Axes, told: Advice, lines: list[str]) -> list[float]:
         _beside(ax, row, numbers, best is told.found.advised)
         names.append(f"{best.family.name}\n{best.family.words(best.values)}" if best.values else best.family.name)
         marked += ends
-    formulas = [(f"{row.formula} ({row.source})", row.stiffness_N_m) for row in told.formulas]
+    formulas = [(f"{row.formula}\n({row.source})", row.stiffness_N_m) for row in told.formulas]
     published = [(f"published: {value.by}", value.stiffness_N_m) for value in told.published]
     for label, known, colour in (("formula", formulas, style.ELEMENTS[0]), ("published", published, style.ELEMENTS[1])):
         for place, (name, stiffness) in enumerate(known):
@@ -90,8 +115,9 @@ def _walls(ax: Axes, told: Advice, lines: list[str]) -> list[float]:
             _beside(ax, len(names), ("", "", format_stiffness(stiffness)))
             names.append(name)
             marked.append(drawn)
-    title = f"{told.name}: upper bound, not advice" if told.is_ideal else f"{told.name}: how stiff a wall may be"
-    _finish(ax, title, names, lines)
+    name = textwrap.shorten(told.name, _NAME_LETTERS, placeholder=" ...")
+    title = f"{name}: upper bound, not advice" if told.is_ideal else f"{name}: how stiff a wall may be"
+    _finish(ax, title, names)
     _beside(ax, -0.85, ("attacked", "every corner", "as described"), bold=True)
     return marked
 
@@ -116,7 +142,7 @@ def _changes(ax: Axes, told: Advice, others: list[tuple[str, Limit, Limit | None
         ax.axvline(nominal / 1e3, color=style.INK, linewidth=1.2, label="unchanged", zorder=1)
     has_element = bool(told.found.advised.values)
     title = "after one change of the device, in the hardest corners" + ", with the element tuned again" * has_element
-    _finish(ax, title, [name for name, *_ in others], [])
+    _finish(ax, title, [name for name, *_ in others])
     _beside(ax, -0.85, ("", "element", "without") if has_element else ("", "", ""), bold=True)
     return [nominal, *(limit.stiffness_N_m for _, limit, _ in others)]
 
@@ -158,13 +184,12 @@ def _keep_within(ax: Axes) -> None:
                 line.set(marker="<", clip_on=False)
 
 
-def _finish(ax: Axes, title: str, names: list[str], lines: list[str]) -> None:
-    """Names the rows, and puts lines of text below the axis and the legend above it."""
+def _finish(ax: Axes, title: str, names: list[str]) -> None:
+    """Names the rows, and puts the legend above the axis."""
     style.dress(ax, "", "wall stiffness, N/mm", "")
     ax.set_title(title, loc="left", pad=22, fontsize=style.TEXT + 1, fontweight="bold", color=style.INK)
     ax.set_yticks(range(len(names)), names, fontsize=style.TEXT)
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
-    text = "\n".join(["wall stiffness, N/mm", *lines])
-    ax.set_xlabel(text, loc="left", fontsize=style.TEXT, color=style.GREY, linespacing=1.5)
+    ax.set_xlabel("wall stiffness, N/mm", loc="left", fontsize=style.TEXT, color=style.GREY)
     style.legend(ax, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5)
