@@ -136,7 +136,9 @@ def test_a_scene_that_raises_costs_no_other_its_result() -> None:
 def test_stopped_the_parts_under_way_are_still_told() -> None:
     stopped: list[bool] = []
     with Pool(1) as pool:
-        done = pool.parts(Work(make=of_stiffness), [Group(range(3, 1000), together=False)], stop=lambda: bool(stopped))
+        done = pool.parts(
+            Work(make=of_stiffness), [Group(range(3, 1000), together=False)], stop=lambda _: bool(stopped)
+        )
         seen = [item for item, _ in next(done)]
         stopped.append(True)
         seen += [item for part in done for item, _ in part]

@@ -18,6 +18,7 @@ from haploop.tools.figure import style
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.transforms import Transform
 
 _WIDTH_IN, _ROW_IN, _BESIDE_IN = 11.0, 0.37, 1.6
 # Of the answer: letters of its headline and of other lines, the height of a line, and, in the figure's widths, where
@@ -58,8 +59,10 @@ def figure_of(told: Advice) -> Figure:
     height_in = (len(headline) + sum(len(wrapped) for _, wrapped in lines)) * _LINE_IN
     heights = [rows * _ROW_IN + _BESIDE_IN, height_in, len(others) * _ROW_IN + _BESIDE_IN]
     figure = style.empty_figure(_WIDTH_IN, sum(heights))
+    from matplotlib.transforms import blended_transform_factory
+
     above, between, below = figure.subplots(3, 1, height_ratios=heights)
-    _answer(between, headline, lines)
+    _answer(between, blended_transform_factory(figure.transFigure, between.transData), headline, lines)
     stiffnesses = [_walls(above, told), _changes(below, told, others)]
     for ax in (above, below):
         ax.set_xlim(*_ends([value / 1e3 for values in stiffnesses for value in values]))
@@ -69,11 +72,8 @@ def figure_of(told: Advice) -> Figure:
     return figure
 
 
-def _answer(ax: Axes, headline: list[str], lines: list[tuple[str, list[str]]]) -> None:
-    """Writes the answer across the figure: its headline, then every name with its lines."""
-    from matplotlib.transforms import blended_transform_factory
-
-    across = blended_transform_factory(ax.get_figure(root=True).transFigure, ax.transData)
+def _answer(ax: Axes, across: Transform, headline: list[str], lines: list[tuple[str, list[str]]]) -> None:
+    """Writes the answer across the figure, one line a unit of y: its headline, then every name with its lines."""
     look = {"transform": across, "va": "center", "fontsize": style.TEXT, "in_layout": False}
     row = 0
     for line in headline:
