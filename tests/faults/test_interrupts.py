@@ -12,7 +12,17 @@ import pytest
 
 import haploop.logger
 from haploop.launch.runs.replay import replay
-from helpers.live.launched import AT_REST, HAPLOOP, PATIENCE_S, SCENE, first_and_slowly, processes, same_bits, wait_for
+from helpers.live.launched import (
+    AT_REST,
+    HAPLOOP,
+    PATIENCE_S,
+    SCENE,
+    first_and_slowly,
+    log_so_far,
+    processes,
+    same_bits,
+    wait_for,
+)
 
 SIGNALS = first_and_slowly(signal.SIGINT, signal.SIGTERM)
 
@@ -88,7 +98,7 @@ def test_the_second_signal_ends_a_run_at_once_that_the_first_cannot_end(running,
 def test_the_first_signal_ends_a_run_in_one_process_in_order_too(number, launched, tmp_path, undisturbed):
     out = tmp_path / "out"
     run = launched("run", str(SCENE), "--set", "duration=600", "--in-process", "--json", out=out)
-    wait_for("the log", lambda: (out / "log.mcap").exists() and haploop.logger.read(out).get("/controller"))
+    wait_for("the log", lambda: log_so_far(out).get("/controller"))
     run.signal(number)
     summary = run.summary()
     assert 0 < summary["ticks"] < 600_000

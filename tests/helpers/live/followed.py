@@ -4,9 +4,8 @@ import asyncio
 
 import numpy as np
 
-from haploop.logger import read
 from helpers.live.browsing import site, to_its_end
-from helpers.live.launched import wait_for
+from helpers.live.launched import log_so_far, wait_for
 from helpers.live.live_run import going
 
 TOUCHING = ("wall.position=-0.001", "duration=600")
@@ -32,7 +31,7 @@ async def has_logged(run, ticks):
     """Waits until ``ticks`` ticks can be read from the log."""
 
     def look():
-        log = read(run.prepared.out)
+        log = log_so_far(run.prepared.out)
         return log if len(log.get("/energy", {}).get("timestamp", ())) >= ticks else None
 
     return await asyncio.to_thread(wait_for, f"tick {ticks} in the log", look)

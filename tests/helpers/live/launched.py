@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import pytest
 
 from haploop.launch.processes import private_directory, run_directory
 from haploop.logger import read
+from haploop.logger.log import LogError
 from haploop.logger.log.recording import Recording
 from haploop.protocol.transport.messages import PROCESSES
 
@@ -103,6 +104,13 @@ def where(pid: int) -> str:
     status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines()
     threads = [f"{task.name}: {(task / 'wchan').read_text()}" for task in Path(f"/proc/{pid}/task").iterdir()]
     return "\n".join([*threads, *(line for line in status if line.startswith(("State", "Sig", "Shd")))])
+
+
+def log_so_far(directory: Path) -> Mapping[str, Any]:
+    """Returns the channels that can be read of a log while it is written; none before its first bytes are there."""
+    with contextlib.suppress(FileNotFoundError, LogError):
+        return read(directory)
+    return {}
 
 
 def command(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -262,7 +270,7 @@ class Run(Launched):
         self.reaches(ticks)
 
         def look() -> int:
-            log = self.log()
+            log = log_so_far(self.out_directory)
             return len(log["/controller"]["x"]) if "/controller" in log else 0
 
         return wait_for("a flushed log", lambda: found if (found := look()) >= ticks else 0)
