@@ -28,6 +28,7 @@ from haploop.launch.shown_prints import PRINTS, ShownPrints
 from haploop.launch.spec import OutputError, RunFailed, RunSpec
 from haploop.protocol.brought import names_of_files
 from haploop.protocol.changes import Event
+from haploop.protocol.scene.scene import Run
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.machine import Machine, machine_of
 from haploop.protocol.transport.sockets import SecureContext, Transport, with_host_of
@@ -40,10 +41,10 @@ if TYPE_CHECKING:
 # pinned, the number of the run, and the foreign programs that take the place of its own.
 Start = Callable[[Path, Callable[[str], Message], bool, int, Mapping[str, Program]], dict[str, Child]]
 
-# After a node has failed, in s at the usual deadline, and in proportion more at a longer one, which is given on busy
-# machines: nodes heard from within the first time have the second to hand over their last blocks; then the logger has
-# the third to save its files.
-_SILENT_S, _HANDING_S, _SAVING_S, _USUAL_DEADLINE_S = 0.5, 1.0, 2.0, 5.0
+# After a node has failed, in s: nodes heard from within the first time have the second to hand over their last blocks;
+# then the logger has the third to save its files. A run.deadline longer than the default makes them longer, too: it is
+# given where a machine is busy.
+_SILENT_S, _HANDING_S, _SAVING_S = 0.5, 1.0, 2.0
 # Time between looks at silent nodes; commands, reports and deaths are noticed at once.
 _LOOK_MS = 100
 
@@ -243,7 +244,7 @@ class Supervisor:
     def _save(self, reason: str) -> None:
         """Has the nodes that answer hand their last blocks to the logger, ends them, and lets it write what it has."""
         roster, loop = self._server.roster, [child for role, child in self._children.items() if role != "logger"]
-        patience = max(1.0, self._spec.scene.run.deadline / _USUAL_DEADLINE_S)
+        patience = max(1.0, self._spec.scene.run.deadline / Run.deadline)
         lost = {node.role for node in roster.silent(self._machine.now(), patience * _SILENT_S)}
         lost |= {child.role for child in loop if child.wait(0.0)}
         if (logger := roster.own("logger")) and not self._children["logger"].wait(0.0):
