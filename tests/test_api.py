@@ -19,7 +19,8 @@ from haploop.launch.spec import RunFailed
 from haploop.logger.summary import read as read_summary
 from haploop.tools.cli.app import app
 from haploop.tools.figure.data import FigureError
-from helpers.live.launched import PATIENCE_S, SCENES, wait_for
+from helpers.live.launched import SCENES
+from helpers.live.waiting import PATIENCE_S, wait_for
 from helpers.scenes.brake import source
 
 # Begins inside the wall.

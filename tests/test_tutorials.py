@@ -18,7 +18,8 @@ import pytest
 from haploop.launch.processes import run_directory
 from haploop.tools.sweep.table import read as read_table
 from helpers.documented import LIVE, Block, blocks, commands
-from helpers.live.launched import HAPLOOP, PATIENCE_S, PATIENT, wait_for
+from helpers.live.launched import HAPLOOP, PATIENT
+from helpers.live.waiting import PATIENCE_S, wait_for
 
 pytestmark = [pytest.mark.slow, pytest.mark.long]
 

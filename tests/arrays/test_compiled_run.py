@@ -13,10 +13,10 @@ import pytest
 from haploop.controller.dissipation import Element, Motion, Quantity, where
 from haploop.launch.runs.in_batch import run_batch
 from haploop.launch.runs.in_jax import compiled_results, compiling
-from helpers.live.launched import first_and_slowly
 from helpers.runs.batches import PUSH, Stiffening, alone, pressed, with_element
 from helpers.runs.compiled import agree, compiled, many
 from helpers.scenes.least import KINDS
+from helpers.slowly import first_and_slowly
 
 
 @pytest.mark.slow

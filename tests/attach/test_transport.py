@@ -14,7 +14,9 @@ from haploop.protocol.transport.addresses import TransportError
 from haploop.protocol.transport.keys import make_keys
 from haploop.protocol.transport.messages import PROCESSES
 from haploop.protocol.transport.sockets import Transport
-from helpers.live.launched import PATIENCE_S, PATIENT, first_and_slowly, wait_for
+from helpers.live.launched import PATIENT
+from helpers.live.waiting import PATIENCE_S, wait_for
+from helpers.slowly import first_and_slowly
 
 SCENE = Path(__file__).parents[2] / "launch" / "scenes" / "fig6c.toml"
 

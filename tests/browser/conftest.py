@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from helpers.live.browser import BROWSERS, DESK, is_complaint
-from helpers.live.launched import PATIENCE_S
+from helpers.live.waiting import PATIENCE_S
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

@@ -10,7 +10,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from helpers.live.browser import IN_BOTH, free_port
-from helpers.live.launched import Launched, Run, wait_for
+from helpers.live.launched import Launched, Run
+from helpers.live.waiting import wait_for
 
 pytest.importorskip("aiohttp", reason="the live page needs aiohttp: pip install 'haploop[view]'")
 LINK = re.compile(r"http://127\.0\.0\.1:\d+/#token=\S+")

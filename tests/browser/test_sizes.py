@@ -4,8 +4,9 @@ import pytest
 from playwright.sync_api import expect
 
 from helpers.live.browser import DESK, IN_BOTH, PHONE, still
-from helpers.live.launched import first_and_slowly, wait_for
 from helpers.live.stand_in import ENDED, RUNNING, RUNS, SUMMARY
+from helpers.live.waiting import wait_for
+from helpers.slowly import first_and_slowly
 from oracles.snapshots import contact, snapshot, table
 
 TABLET, LARGE = {"width": 820, "height": 1180}, {"width": 1920, "height": 1080}

@@ -4,8 +4,8 @@ import pytest
 from playwright.sync_api import expect
 
 from helpers.live.browser import order
-from helpers.live.launched import wait_for
 from helpers.live.stand_in import OPTIONS, RUNNING, TOKEN
+from helpers.live.waiting import wait_for
 from oracles.snapshots import contact
 
 

@@ -20,8 +20,10 @@ from haploop.launch.runs.replay import replay
 from haploop.launch.scene.file import load
 from haploop.logger.log.recording import Recording
 from helpers.live import attacks
-from helpers.live.launched import BRIEF, PATIENCE_S, SCENES, Run, alive, wait_for
+from helpers.live.launched import BRIEF, SCENES, Run
 from helpers.live.programs import compiled, in_node, program, seat
+from helpers.live.system import alive
+from helpers.live.waiting import PATIENCE_S, wait_for
 
 pytestmark = pytest.mark.slow
 

@@ -15,7 +15,8 @@ from haploop.logger import read
 from haploop.logger.log.writer import Log
 from haploop.tools.cli.app import app
 from helpers.data.logs import cut, swapped_run
-from helpers.live.launched import first_and_slowly, on_a_disk_of
+from helpers.live.system import on_a_disk_of
+from helpers.slowly import first_and_slowly
 
 FORMATS = ("csv", "npz", "parquet", "json-mcap")
 

@@ -11,7 +11,10 @@ from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.replay import ReplayError, replay
 from haploop.launch.scene.file import load
-from helpers.live.launched import BRIEF, BRIEF_S, SCENE, alive, first_and_slowly, wait_for
+from helpers.live.launched import BRIEF, BRIEF_S, SCENE
+from helpers.live.system import alive
+from helpers.live.waiting import wait_for
+from helpers.slowly import first_and_slowly
 
 KINDS = registry()
 # It stands still at tick 500, so that it is surely still there when something joins it.

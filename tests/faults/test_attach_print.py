@@ -9,7 +9,8 @@ import pytest
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
-from helpers.live.launched import SCENE, wait_for, wait_till_stays
+from helpers.live.launched import SCENE
+from helpers.live.waiting import wait_for, wait_till_stays
 
 KINDS = registry()
 # It stands still at tick 500, so that it is surely still there when something joins it.

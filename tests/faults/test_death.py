@@ -9,7 +9,10 @@ import pytest
 import haploop.logger
 from haploop.launch.processes import run_directory
 from haploop.launch.runs.replay import replay
-from helpers.live.launched import AT_REST, BRIEF, BRIEF_S, LONG, ROLES, alive, first_and_slowly, same_bits, wait_for
+from helpers.live.launched import AT_REST, BRIEF, BRIEF_S, LONG, ROLES, same_bits
+from helpers.live.system import alive
+from helpers.live.waiting import wait_for
+from helpers.slowly import first_and_slowly
 
 NAMED = r"The {} was killed by SIGKILL; the last tick all nodes had done is (\d+) "
 

@@ -7,7 +7,7 @@ import pytest
 
 import haploop.logger
 from haploop.launch.runs.replay import replay
-from helpers.live.launched import first_and_slowly
+from helpers.slowly import first_and_slowly
 
 # A force -b v held over T on a free mass m turns v over and more than back when b T / m > 2.
 UNSTABLE = ('dissipation=[{kind="damping", damping=60.0, acts="always"}]',)

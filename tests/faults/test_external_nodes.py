@@ -13,7 +13,10 @@ import pytest
 from haploop.launch.processes import private_directory
 from haploop.logger import read
 from helpers.live.foreign import CONTROLLER, Started
-from helpers.live.launched import HAPLOOP, PATIENCE_S, Launched, alive, first_and_slowly, wait_for
+from helpers.live.launched import HAPLOOP, Launched
+from helpers.live.system import alive
+from helpers.live.waiting import PATIENCE_S, wait_for
+from helpers.slowly import first_and_slowly
 
 
 def seat_of(run: Launched, role: str = "controller") -> Path:

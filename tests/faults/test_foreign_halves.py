@@ -21,11 +21,11 @@ from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.transport.wire import Frame
 from haploop.tools.render.report import summary_table
-from helpers.live.launched import first_and_slowly
 from helpers.runs.captured import run as run_captured
 from helpers.scenes.every_effect import EVERYTHING
 from helpers.scenes.least import scene
 from helpers.shown import shown
+from helpers.slowly import first_and_slowly
 
 HOUSE = Path(__file__).parents[2]
 FIG6B, FIG6C = (HOUSE / f"launch/scenes/fig6{letter}.toml" for letter in "bc")

@@ -15,7 +15,10 @@ from haploop.launch.foreign import Program, ProgramError, check_wait, read_progr
 from haploop.launch.processes.run_directory import CommandRefused
 from helpers.live.foreign import PLAIN, Started
 from helpers.live.in_process import ask
-from helpers.live.launched import BRIEF, BRIEF_S, SCENE, first_and_slowly, processes, same_bits, wait_for
+from helpers.live.launched import BRIEF, BRIEF_S, SCENE, same_bits
+from helpers.live.system import processes
+from helpers.live.waiting import wait_for
+from helpers.slowly import first_and_slowly
 
 # Ways to fail that only a deadline finds.
 WAITED_FOR = ("hang", "silent", "mute", "unfinished")

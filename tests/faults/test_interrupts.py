@@ -12,17 +12,10 @@ import pytest
 
 import haploop.logger
 from haploop.launch.runs.replay import replay
-from helpers.live.launched import (
-    AT_REST,
-    HAPLOOP,
-    PATIENCE_S,
-    SCENE,
-    first_and_slowly,
-    log_so_far,
-    processes,
-    same_bits,
-    wait_for,
-)
+from helpers.live.launched import AT_REST, HAPLOOP, SCENE, log_so_far, same_bits
+from helpers.live.system import processes
+from helpers.live.waiting import PATIENCE_S, wait_for
+from helpers.slowly import first_and_slowly
 
 SIGNALS = first_and_slowly(signal.SIGINT, signal.SIGTERM)
 

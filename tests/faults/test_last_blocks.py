@@ -20,9 +20,10 @@ from haploop.plant.plant import Plant
 from haploop.protocol.ticks import Timebase
 from haploop.tools.figure.data import FigureError, RunData
 from haploop.tools.figure.run_figure import book_rows, key_numbers, make_figure
-from helpers.live.launched import SCENES, first_and_slowly
+from helpers.live.launched import SCENES
 from helpers.scenes.brake import source
 from helpers.shown import artists
+from helpers.slowly import first_and_slowly
 
 SCENE = SCENES / "fig6c.toml"
 STEPS = 10

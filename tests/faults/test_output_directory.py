@@ -14,7 +14,9 @@ from haploop.launch.runs.start import prepare
 from haploop.launch.spec import OutputError, make_output
 from haploop.tools.sweep.store import Store
 from haploop.tools.sweep.table import make_schema
-from helpers.live.launched import HAPLOOP, PATIENCE_S, SCENE, command, first_and_slowly
+from helpers.live.launched import HAPLOOP, SCENE, command
+from helpers.live.waiting import PATIENCE_S
+from helpers.slowly import first_and_slowly
 
 # Round after round, processes that stand at a barrier make the directory at the same instant; prints what each got.
 CROWD = """

@@ -16,8 +16,9 @@ from haploop.logger.log.recording import Recording
 from haploop.tools.attach import plotjuggler
 from haploop.tools.attach.plotjuggler import Outlet, publish
 from helpers.live.in_process import ask
-from helpers.live.launched import PATIENCE_S, first_and_slowly, wait_for, wait_till_stays
 from helpers.live.live_run import Going, going, undisturbed
+from helpers.live.waiting import PATIENCE_S, wait_for, wait_till_stays
+from helpers.slowly import first_and_slowly
 from oracles.plotjuggler_rules import Viewer
 
 END = "/end"

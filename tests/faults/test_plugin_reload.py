@@ -10,7 +10,9 @@ import pytest
 
 from haploop.launch.processes import run_directory
 from haploop.launch.runs.replay import replay
-from helpers.live.launched import BRIEF, LONG, alive, wait_for
+from helpers.live.launched import BRIEF, LONG
+from helpers.live.system import alive
+from helpers.live.waiting import wait_for
 from helpers.scenes.brake import source
 
 BREAKS = {

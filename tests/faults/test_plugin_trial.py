@@ -13,8 +13,10 @@ from haploop.controller.dissipation.registry import load_source
 from haploop.launch.clock.plugin_trial import PluginTrial
 from haploop.protocol.scene.scene import ElementTable
 from helpers.live.in_process import ask
-from helpers.live.launched import first_and_slowly, processes_of, wait_for
+from helpers.live.system import processes_of
+from helpers.live.waiting import wait_for
 from helpers.scenes.brake import source
+from helpers.slowly import first_and_slowly
 
 NEVER = "while True: pass"
 # What a file may do to the process that runs it, and what is said of it.

@@ -12,7 +12,10 @@ import haploop.logger
 from haploop.launch.processes import run_directory
 from haploop.launch.runs.replay import replay
 from haploop.logger.summary import SUMMARY, read
-from helpers.live.launched import BRIEF, BRIEF_S, ROLES, SCENES, alive, command, first_and_slowly, pending, wait_for
+from helpers.live.launched import BRIEF, BRIEF_S, ROLES, SCENES, command
+from helpers.live.system import alive, pending
+from helpers.live.waiting import wait_for
+from helpers.slowly import first_and_slowly
 
 HEAD = """
 import math, os, sys

@@ -19,8 +19,10 @@ from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.scene.file import load
 from haploop.launch.shown_prints import ShownPrints
 from haploop.protocol.transport.prints import NodeOutput
-from helpers.live.launched import HAPLOOP, PATIENCE_S, SCENES, command, first_and_slowly, wait_for
+from helpers.live.launched import HAPLOOP, SCENES, command
+from helpers.live.waiting import PATIENCE_S, wait_for
 from helpers.scenes.brake import source
+from helpers.slowly import first_and_slowly
 
 SETS = ("duration=0.3", "run.verdict=window", 'dissipation=[{kind="brake", acts="always"}]')
 MARKED = re.compile(r"controller(, tick \d+)?: ")

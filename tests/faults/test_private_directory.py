@@ -13,7 +13,9 @@ import pytest
 from haploop.launch.processes import private_directory, run_directory
 from haploop.launch.spec import OutputError
 from helpers.live.in_process import ask
-from helpers.live.launched import LONG, SCENE, first_and_slowly, wait_for
+from helpers.live.launched import LONG, SCENE
+from helpers.live.waiting import wait_for
+from helpers.slowly import first_and_slowly
 
 LONG_AGO = (0, 0)
 # Holds a directory's lock until its standard input closes, as a launcher does that nobody's list of processes shows.

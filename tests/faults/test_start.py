@@ -16,8 +16,9 @@ from haploop.launch.processes import children, deadlines, open_files
 from haploop.launch.processes.early import Started, start_early, start_node
 from haploop.launch.spec import OutputError, RunFailed
 from haploop.protocol.transport.messages import PROCESSES
-from helpers.live.launched import BRIEF, BRIEF_S, PATIENCE_S, wait_for
+from helpers.live.launched import BRIEF, BRIEF_S
 from helpers.live.live_run import Going, going
+from helpers.live.waiting import PATIENCE_S, wait_for
 
 
 def stop_when_joined(run: Going, role: str) -> int:

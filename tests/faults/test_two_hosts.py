@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 
 from haploop.protocol.transport.keys import make_keys
-from helpers.live.launched import HAPLOOP, PATIENCE_S, PATIENT, SCENE, alive, wait_for
+from helpers.live.launched import HAPLOOP, PATIENT, SCENE
+from helpers.live.system import alive
 from helpers.live.two_hosts import A6, A, Wire, on, two_hosts, why_not
+from helpers.live.waiting import PATIENCE_S, wait_for
 
 pytestmark = pytest.mark.slow
 FAR_AND_LOSSY = {"delay_s": 0.01, "loss": 0.01}

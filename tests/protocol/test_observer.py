@@ -6,8 +6,8 @@ import pytest
 from haploop.logger import read
 from haploop.protocol.transport.clock_client import ClockClient
 from haploop.protocol.transport.observer import Observer
-from helpers.live.launched import wait_for
 from helpers.live.live_run import going, undisturbed
+from helpers.live.waiting import wait_for
 
 ALL = ("plant", "controller", "logger")
 

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import haploop.logger
-from helpers.live.launched import PATIENCE_S
 from helpers.live.live_run import Going, going, undisturbed
+from helpers.live.waiting import PATIENCE_S
 
 OBSERVER = Path(__file__).parents[1] / "oracles/plain_observer.py"
 README = Path(__file__).parents[2] / "protocol" / "README.md"

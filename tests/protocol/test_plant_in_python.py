@@ -23,8 +23,9 @@ from haploop.launch.runs.start import prepare, run
 from haploop.launch.spec import OutputError, RunFailed
 from haploop.protocol.transport.keys import make_keys
 from haploop.protocol.transport.sockets import Transport
-from helpers.live.launched import BRIEF, HAPLOOP, PATIENCE_S, wait_for
+from helpers.live.launched import BRIEF, HAPLOOP
 from helpers.live.live_run import going
+from helpers.live.waiting import PATIENCE_S, wait_for
 
 HOUSE = Path(__file__).parents[2]
 SCENE = HOUSE / "launch/scenes/fig6b.toml"

@@ -16,9 +16,9 @@ from haploop.tools.figure.data import TOGETHER, FigureError, History, RunData
 from haploop.tools.figure.loops import force_position_loop, momentum_loop
 from haploop.tools.figure.run_figure import draw, make_figure
 from haploop.tools.figure.time import extremes
-from helpers.live.launched import first_and_slowly
 from helpers.scenes.least import scene
 from helpers.shown import artists, axes
+from helpers.slowly import first_and_slowly
 
 PNG = b"\x89PNG"
 

@@ -16,7 +16,9 @@ import pytest
 
 from haploop.tools.sweep.table import TableError, read
 from helpers.live.in_process import ask
-from helpers.live.launched import HAPLOOP, PATIENCE_S, Launched, alive, processes, wait_for
+from helpers.live.launched import HAPLOOP, Launched
+from helpers.live.system import alive, processes
+from helpers.live.waiting import PATIENCE_S, wait_for
 from helpers.scenes.sweep_files import PRESS, sweep_file, swept
 
 # Such scenes go into no array: so many take so long that something can be done to the sweep meanwhile.

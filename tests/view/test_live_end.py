@@ -16,8 +16,9 @@ from haploop.tools.cli.live_runs import LiveRuns
 from haploop.view.receive.run_session import RunSession
 from helpers.live.browsing import site, to_its_end
 from helpers.live.followed import follow, same, whole
-from helpers.live.launched import PATIENCE_S, first_and_slowly, wait_for
 from helpers.live.live_run import going
+from helpers.live.waiting import PATIENCE_S, wait_for
+from helpers.slowly import first_and_slowly
 
 
 @pytest.mark.slow

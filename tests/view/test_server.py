@@ -10,7 +10,7 @@ import pytest
 from haploop.view.serve import connections, server
 from haploop.view.serve.server import listen
 from helpers.live.browsing import NoRuns, scenario, site, status, stream
-from helpers.live.launched import PATIENCE_S
+from helpers.live.waiting import PATIENCE_S
 
 NO_HTTP = [
     random.Random(1).randbytes(2000),

@@ -19,7 +19,7 @@ from haploop.view.draw.messages import event_lines
 from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.store.history import AtWork, History
 from helpers.live.browsing import decode, to_its_end
-from helpers.live.launched import PATIENCE_S
+from helpers.live.waiting import PATIENCE_S
 from helpers.scenes.least import typed
 
 TIME = Timebase(10_000, 1_000, 0, 100_000)

@@ -15,8 +15,10 @@ import pytest
 
 from helpers.live.browsing import Tab, stream, to_its_end
 from helpers.live.in_process import ask
-from helpers.live.launched import HAPLOOP, PATIENCE_S, SCENE, Launched, alive, command, processes, wait_for
+from helpers.live.launched import HAPLOOP, SCENE, Launched, command
 from helpers.live.live_run import going, undisturbed
+from helpers.live.system import alive, processes
+from helpers.live.waiting import PATIENCE_S, wait_for
 
 # The run stands still before its first tick until a test resumes it.
 STANDS = ("--set", "event=[{at=0, pause=true}]")

@@ -26,7 +26,9 @@ from haploop.launch.runs.replay import replay
 from haploop.launch.scene.file import load
 from haploop.logger import read
 from haploop.logger.log.recording import Recording
-from helpers.live.launched import SCENE, Run, processes_of, same_bits, wait_for
+from helpers.live.launched import SCENE, Run, same_bits
+from helpers.live.system import processes_of
+from helpers.live.waiting import wait_for
 
 TICKS = 3000
 _SETS = (f"duration={TICKS / 1000:g}", "run.verdict=window")

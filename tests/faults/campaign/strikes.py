@@ -18,7 +18,9 @@ import zmq
 from haploop.launch.processes import run_directory
 from haploop.protocol.transport.messages import PROCESSES
 from helpers.live import attacks
-from helpers.live.launched import SCENE, Launched, Run, command, processes, wait_for
+from helpers.live.launched import SCENE, Launched, Run, command
+from helpers.live.system import processes
+from helpers.live.waiting import wait_for
 
 _CARRIED_OUT = (
     ("set", {"set": {"wall.stiffness": 120.0}}),

@@ -17,7 +17,7 @@ from haploop.tools.cli.live_runs import LiveRuns
 from haploop.view.receive.runs import CommandFailed, Runs
 from haploop.view.serve.guard import Guard
 from haploop.view.serve.server import listen, serve
-from helpers.live.launched import PATIENCE_S
+from helpers.live.waiting import PATIENCE_S
 
 
 def to_its_end(work: Coroutine[Any, Any, Any]) -> Any:

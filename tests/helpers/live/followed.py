@@ -5,8 +5,9 @@ import asyncio
 import numpy as np
 
 from helpers.live.browsing import site, to_its_end
-from helpers.live.launched import log_so_far, wait_for
+from helpers.live.launched import log_so_far
 from helpers.live.live_run import going
+from helpers.live.waiting import wait_for
 
 TOUCHING = ("wall.position=-0.001", "duration=600")
 

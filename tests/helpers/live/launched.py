@@ -10,23 +10,21 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
-
-import pytest
 
 from haploop.launch.processes import private_directory, run_directory
 from haploop.logger import read
 from haploop.logger.log import LogError
 from haploop.logger.log.recording import Recording
 from haploop.protocol.transport.messages import PROCESSES
+from helpers.live.system import alive, on_a_disk_of, processes, where
+from helpers.live.waiting import PATIENCE_S, wait_for
 
 SCENES = Path(__file__).parents[3] / "launch/scenes"
 SCENE = SCENES / "fig6c.toml"
 HAPLOOP = [sys.executable, "-m", "haploop.tools.cli"]
-# Time after which a test gives up. It does not imply how long anything may take.
-PATIENCE_S = 120.0
 # No process is silent for so long, however busy the machine; the deadline of every run whose deadline is not tested.
 PATIENT = "run.deadline=30"
 # For a run with a process that stays silent: long enough that no other process is blamed on a busy machine.
@@ -40,72 +38,6 @@ PACE = ("--pace", "5")
 ROLES = tuple(PROCESSES)
 
 
-def first_and_slowly(*values: Any) -> list[Any]:
-    """Parameters of a test, all but the first for the slow tests only; a tuple is several parameters."""
-    rest = [value if isinstance(value, tuple) else (value,) for value in values[1:]]
-    return [values[0], *(pytest.param(*value, marks=pytest.mark.slow) for value in rest)]
-
-
-Row = tuple[int, int, str, str]
-
-
-def wait_for(what: str, look: Callable[[], Any]) -> Any:
-    """The first true result of ``look``."""
-    give_up = time.monotonic() + PATIENCE_S
-    while not (answer := look()):
-        assert time.monotonic() < give_up, f"{what} has not come within {PATIENCE_S:g} s"
-        time.sleep(0.03)
-    return answer
-
-
-def wait_till_stays(what: str, look: Callable[[], Any], value: Any) -> None:
-    """Waits until ``look`` gives a value eleven times in a row: a node that is greeted has the tick of the run, too."""
-    found: list[bool] = []
-
-    def stays() -> bool:
-        found.append(look() == value)
-        return len(found) > 10 and all(found[-11:])
-
-    wait_for(what, stays)
-
-
-def processes() -> list[Row]:
-    """(pid, parent, state, command line) of every process; with ``-ww`` no line is cut at a terminal's width."""
-    listing = subprocess.run(
-        ["ps", "-A", "-ww", "-o", "pid=,ppid=,stat=,args="], capture_output=True, text=True, check=True
-    )
-    rows = (line.split(maxsplit=3) for line in listing.stdout.splitlines())
-    return [(int(row[0]), int(row[1]), row[2], row[3]) for row in rows if len(row) == 4]
-
-
-def alive(pids: Sequence[int]) -> list[int]:
-    """Returns those of these processes that still exist; one that only waits to be reaped does not count."""
-    return [pid for pid, _, state, _ in processes() if pid in pids and not state.startswith("Z")]
-
-
-def processes_of(place: Path) -> list[int]:
-    """Returns the processes whose environment names this directory for live runs (Linux)."""
-    found, mark = [], f"XDG_RUNTIME_DIR={place}\0".encode()
-    for path in Path("/proc").glob("[0-9]*/environ"):
-        with contextlib.suppress(OSError):
-            found += [int(path.parent.name)] if mark in path.read_bytes() else []
-    return found
-
-
-def pending(pid: int) -> bool:
-    """Tells whether a signal is waiting for the process to get processor time (Linux)."""
-    status = Path(f"/proc/{pid}/status")
-    lines = status.read_text(encoding="utf-8").splitlines() if status.exists() else []
-    return any(int(line.split()[1], 16) for line in lines if line.startswith(("SigPnd", "ShdPnd")))
-
-
-def where(pid: int) -> str:
-    """Returns what each thread of a process waits for, and its pending and ignored signals (Linux)."""
-    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines()
-    threads = [f"{task.name}: {(task / 'wchan').read_text()}" for task in Path(f"/proc/{pid}/task").iterdir()]
-    return "\n".join([*threads, *(line for line in status if line.startswith(("State", "Sig", "Shd")))])
-
-
 def log_so_far(directory: Path) -> Mapping[str, Any]:
     """Returns the channels that can be read of a log while it is written; none before its first bytes are there."""
     with contextlib.suppress(FileNotFoundError, LogError):
@@ -116,12 +48,6 @@ def log_so_far(directory: Path) -> Mapping[str, Any]:
 def command(*arguments: str) -> subprocess.CompletedProcess[str]:
     """Runs a haploop command to its end, as from another terminal."""
     return subprocess.run([*HAPLOOP, *arguments], capture_output=True, text=True, timeout=PATIENCE_S)
-
-
-def on_a_disk_of(size_bytes: int, command: list[str]) -> list[str]:
-    """The command as on a disk that is full after ``size_bytes``: every write beyond fails, in its children too."""
-    limit = "import os, resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)"
-    return [sys.executable, "-c", f"{limit}; os.execv(sys.argv[2], sys.argv[2:])", str(size_bytes), *command]
 
 
 def same_bits(log: Recording, truth: Recording) -> int:

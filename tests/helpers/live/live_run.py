@@ -18,7 +18,8 @@ from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.spec import RunSpec
 from haploop.protocol.scene.scene import EventTable
-from helpers.live.launched import PATIENCE_S, PATIENT, wait_for
+from helpers.live.launched import PATIENT
+from helpers.live.waiting import PATIENCE_S, wait_for
 
 SCENE = Path(__file__).parents[3] / "launch" / "scenes" / "fig6c.toml"
 

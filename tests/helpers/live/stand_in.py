@@ -14,7 +14,7 @@ from typing import Any
 from aiohttp import WSMsgType, web
 
 from helpers.live.browser import free_port
-from helpers.live.launched import PATIENCE_S, wait_for
+from helpers.live.waiting import PATIENCE_S, wait_for
 
 STATIC = Path(__file__).parents[3] / "nodes/haploop/view/serve/static"
 TOKEN = "a-token"

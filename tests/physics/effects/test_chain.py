@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from haploop.protocol.scene.paths import with_value
-from helpers.live.launched import first_and_slowly
 from helpers.runs.captured import Captured, bodies, run
 from helpers.scenes.effect_tables import slowly
 from helpers.scenes.least import scene
+from helpers.slowly import first_and_slowly
 from oracles.chain_map import ChainLoop
 from oracles.effects_run import EffectsTruth, follow, simulate
 from oracles.one_tick_map import growth_of

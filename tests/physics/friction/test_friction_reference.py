@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from haploop.protocol.scene.scene import Scene
-from helpers.live.launched import first_and_slowly
 from helpers.runs.captured import bodies, run
 from helpers.scenes.least import scene
 from helpers.scenes.random_scenes import log_uniform
+from helpers.slowly import first_and_slowly
 from oracles.effects_run import follow
 from oracles.friction_heats import friction_heats
 

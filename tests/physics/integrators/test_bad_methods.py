@@ -10,9 +10,9 @@ import pytest
 
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import Scene
-from helpers.live.launched import first_and_slowly
 from helpers.runs.captured import run
 from helpers.scenes.least import scene
+from helpers.slowly import first_and_slowly
 from oracles.effects_reference import Bodies
 
 Rates = Callable[[np.ndarray], np.ndarray]

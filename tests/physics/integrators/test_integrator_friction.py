@@ -14,11 +14,11 @@ from haploop.launch.plan.effects import notes
 from haploop.plant.integrators.stepwise import growth
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.cli.app import app
-from helpers.live.launched import first_and_slowly
 from helpers.runs.captured import in_blocks, run, summarise
 from helpers.scenes.effect_tables import EFFECTS, tap
 from helpers.scenes.every_effect import EVERYTHING, METHODS
 from helpers.scenes.least import mistakes, scene
+from helpers.slowly import first_and_slowly
 
 SCENES = Path(__file__).parents[3] / "launch/scenes"
 ONE_STEP = METHODS[:-1]

@@ -10,9 +10,9 @@ import pytest
 
 from haploop.logger.log.channels import motion_columns
 from haploop.protocol.scene.scene import Scene
-from helpers.live.launched import first_and_slowly
 from helpers.runs.captured import Captured, run
 from helpers.scenes.least import scene
+from helpers.slowly import first_and_slowly
 from oracles.effects_run import follow
 
 ORDERS = {"euler": 1, "semi-implicit-euler": 1, "implicit-midpoint": 2, "rk4": 4}
