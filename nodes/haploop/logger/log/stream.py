@@ -104,7 +104,9 @@ class LogStream:
         except OSError as error:
             raise LogError(f"The log {self.path} cannot be read: {error.strerror}.") from error
         if not start:
-            raise LogError(f"The log {self.path} is empty: its run has only just begun, or ended before it wrote anything.")
+            raise LogError(
+                f"The log {self.path} is empty: its run has only just begun, or ended before it wrote anything."
+            )
         if start != MAGIC:
             begins = f"it begins with {start!r}, not with {MAGIC!r}"
             raise LogError(f"{self.path} is not an MCAP file: {begins}. Give a run's directory or log.")

@@ -126,7 +126,7 @@ def compare(
             for name in names
             for family in families
         }
-        found |= _each(bench, jobs, kept, executor, stage, f"stabilizers on {' and '.join(names)}", _as_rows)
+        found |= _each(bench, jobs, kept, executor, stage, f"stabilizers ({', '.join(names)})", _as_rows)
     return tuple(
         OfLoop(
             name,

@@ -177,7 +177,7 @@ def read_part(path: Path, sweep: str) -> Any:
             return table
     except OSError as error:
         why = error.strerror or "it is damaged"
-    except (ValueError, TypeError, ArithmeticError, LookupError) as error:  # what pyarrow raises
+    except (arrow.lib.ArrowException, ValueError, TypeError, ArithmeticError, LookupError) as error:
         raise TableError(f"{path} cannot be read: it is damaged.") from error
     raise TableError(f"{path} cannot be read: {why}.")
 
