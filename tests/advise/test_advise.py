@@ -41,7 +41,7 @@ def test_a_rigid_device_without_delay_is_ideal_and_one_with_a_cable_or_a_delay_i
     assert not is_ideal(loop_of("premium15", "clock.round_trip_delay=0.001"))
 
 
-@pytest.mark.parametrize(("delay", "title"), [("0 ms", "upper bound, 1 N/mm"), ("1 ms", "1 N/mm")])
+@pytest.mark.parametrize(("delay", "title"), [("0 ms", "upper bound, 1.00 N/mm"), ("1 ms", "1.00 N/mm")])
 def test_the_scene_of_an_upper_bound_is_called_so_in_its_title(delay, title):
     best = Best(DAMPING, (0.5,), Limit(1000.0, 1100.0))
     found = Found((best,), best, 1000.0, None, None, 10)
@@ -79,7 +79,7 @@ def test_an_advice_tells_in_python_what_is_recommended_and_prints_as_the_command
     }  # fmt: skip
     assert (ADVICE.stiffness_N_m, ADVICE.element, ADVICE.without_N_m) == (1640.0, "damping", 910.0)
     assert advice_data(ADVICE, [])["recommended"] == ADVICE.recommended
-    assert repr(ADVICE) == "<Advice on mine: 1640 N/m with 1.1 N s/m of damping>"
+    assert repr(ADVICE) == "<Advice on mine: 1.64 N/mm with 1.1 N s/m of damping>"
     printed = str(AdviceResult(**vars(ADVICE)))
     assert printed.startswith("Advice on mine.")
     assert "1.64 N/mm with 1.1 N s/m of damping" in printed

@@ -10,6 +10,7 @@ from typing import Any
 from haploop.launch.stability.swing import REST_M
 from haploop.launch.stability.why import AFTER_BLOW, AT_HARDEST, DECAYING, DEEPER, FRICTIONLESS, GROWS, LASTS, WHY
 from haploop.logger.verdict.measures import WINDOW_S
+from haploop.protocol.filled import filled
 
 # Swings of the loop and of its run whose widths differ by more than this factor are not the same.
 _WIDER = 1.2
@@ -220,10 +221,10 @@ class Finding:
         width_um, width = 1e6 * self.width_m, _in_words(self.width_m)
         about_s = float(f"{numbers['needs_s']:.2g}")
         run = f"watching for about {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
-        sentence = WHY[self.why].format(**numbers, width=width, width_um=width_um, run=run, decaying=self._decaying())
-        sentence += AFTER_BLOW[self.blown].format(**numbers) if self.blown else ""
-        sentence += AT_HARDEST[self.at_hardest].format(**numbers) if self.at_hardest else ""
-        sentence += DEEPER[self.deeper].format(**numbers) if self.deeper else ""
+        sentence = filled(WHY[self.why], **numbers, width=width, width_um=width_um, run=run, decaying=self._decaying())
+        sentence += filled(AFTER_BLOW[self.blown], **numbers) if self.blown else ""
+        sentence += filled(AT_HARDEST[self.at_hardest], **numbers) if self.at_hardest else ""
+        sentence += filled(DEEPER[self.deeper], **numbers) if self.deeper else ""
         lasts = LASTS.format(_in_words(self.frictionless_m)) if self.frictionless_m else GROWS
         return sentence + (FRICTIONLESS[self.frictionless].format(lasts) if self.frictionless else "")
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from haploop.logger.verdict.about_trend import about_trend
 from haploop.logger.verdict.measures import CROSSINGS, ROUNDING, SMALLEST_SWING_M, WINDOW_S, swings
+from haploop.protocol.filled import filled
 from haploop.view.look.spectrum import main_line
 from haploop.view.store.history import History
 
@@ -135,9 +136,9 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     # The frequency of a swing without a line follows from how often it crosses its middle.
     hertz = line.frequency_Hz if line else crossings / (2.0 * seen_s) if so_far_word in _SWINGS else None
     hertz = None if so_far_word == "no swing seen" else hertz
-    why = _WHY[word if so_far else why or word].format(
-        window=WINDOW_S, begin=by, seen=seen_s, crossings=crossings, growth=growth, swing_um=swing_m * 1e6,
-        width_um=width * 1e6, ripple_N=ripple, most_N=max(ripples)[0],
+    why = filled(
+        _WHY[word if so_far else why or word], window=WINDOW_S, begin=by, seen=seen_s, crossings=crossings,
+        growth=growth, swing_um=swing_m * 1e6, width_um=width * 1e6, ripple_N=ripple, most_N=max(ripples)[0],
     )  # fmt: skip
     swing_now_m = float(min(np.ptp(newest[0]), np.ptp(about_trend(newest[0]))))
     return Sight(

@@ -21,7 +21,7 @@ from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.walls.store import Failure, Tried
 from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.linear.linearity import installed_kinds
-from haploop.tools.render.units import spring
+from haploop.tools.render.units import format_stiffness
 
 # An advice as one JSON object.
 AdviceData = dict[str, Any]
@@ -34,14 +34,14 @@ VARIED, HALVED, NOT_VARIED = "Varied by 20 %: {0}.", "Halved and doubled: {0}.",
 _RIGID = "The scene has no [transmission]: what a resonance of the structure costs is not included."
 _PLUGIN = "The scene's own wall is not tried: its elements come from a plugin file."
 HOLDS_MORE = (
-    "An element that renders less than its wall may hold more: {0} ({1}), {2:.2g} N/mm in the loop as described. It "
+    "An element that renders less than its wall may hold more: {0} ({1}), {2} in the loop as described. It "
     "was not tried in every corner; `haploop compare` shows what it holds."
 )
 FELL = (
     "With {0}, walls of {1} withstand every corner at three holds; at more holds and under attack, one of {2} does not."
 )
 NO_OTHER = (
-    "None of these elements, tried with seven parameter values each, allows {0:.2g} N/mm in every corner, a tenth more "
+    "None of these elements, tried with seven parameter values each, allows {0} in every corner, a tenth more "
     "than the best of the wall alone, damping and inertia: {1}."
 )
 READING = (
@@ -154,7 +154,7 @@ class Advice:
 
     def __repr__(self) -> str:
         at_most, best = "at most " if self.is_ideal else "", self.found.advised
-        wall = spring(self.stiffness_N_m) if self.stiffness_N_m else "no wall"
+        wall = format_stiffness(self.stiffness_N_m) if self.stiffness_N_m else "no wall"
         return f"<Advice on {self.name}: {at_most}{wall} with {best.family.phrase(best.values)}>"
 
     @property
@@ -170,13 +170,16 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
     assumed = [of for of in subject.assumed if is_number(value_at(loop, of.key))]
     keys = [of.key for of in assumed]
     found = search(loop, keys, trial, stage)
-    told = [NO_OTHER.format(found.worth_N_m / 1e3, "; ".join(each.name for each in found.others))] * bool(found.others)
-    told += [HOLDS_MORE.format(of.family.name, of.family.words(of.values), of.held_N_m / 1e3) for of in found.hidden]
-    told += [
-        FELL.format(of.family.phrase(of.values), spring(of.safe.stiffness_N_m), spring(below))
-        for of, below in found.fell
-        if of.safe
-    ]
+    told: list[str] = []
+    if found.others:
+        names = "; ".join(each.name for each in found.others)
+        told.append(NO_OTHER.format(format_stiffness(found.worth_N_m, 2), names))
+    for of in found.hidden:
+        told.append(HOLDS_MORE.format(of.family.name, of.family.words(of.values), format_stiffness(of.held_N_m, 2)))
+    for of, below in found.fell:
+        if of.safe:
+            walls = format_stiffness(of.safe.stiffness_N_m), format_stiffness(below)
+            told.append(FELL.format(of.family.phrase(of.values), *walls))
     stage("changes of the device")
     altered, otherwise = changes(loop), assumed_otherwise(loop, keys)
     ideal = {f"no {name}": changed for name, changed in idealised(loop).items()}

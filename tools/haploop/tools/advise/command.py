@@ -16,7 +16,7 @@ from haploop.logger.summary import finite
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.tools.advise.advice import Advice, AdviceData, advice, advice_data
 from haploop.tools.advise.figure import draw
-from haploop.tools.advise.report import format_stiffness, report, sentences
+from haploop.tools.advise.report import report, sentences
 from haploop.tools.advise.search import STAGES
 from haploop.tools.advise.subject import InvalidRequest, Subject, make_subject
 from haploop.tools.advise.walls.cases import Case, make_loop
@@ -26,6 +26,7 @@ from haploop.tools.command.given import kinds_with, print_notes
 from haploop.tools.command.options import FAILED, WRONG_USE, leave, note_without_numba, plain_errors, print_json
 from haploop.tools.figure.data import FigureError
 from haploop.tools.render.terminal import console
+from haploop.tools.render.units import format_stiffness
 
 ADVICE, FIGURE, WALLS, _ASKED = "advice.json", "figure.png", "walls.jsonl", "asked.toml"
 _SCENE, _BREAKS = "advice.toml", "advice_breaks.toml"

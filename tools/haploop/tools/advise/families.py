@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from haploop.protocol.filled import filled
 from haploop.protocol.scene.scene import ElementTable, Hand, Scene
 from haploop.tools.render.units import fixed
 
@@ -55,7 +56,11 @@ class Family:
 def _format(value: float, key: str) -> str:
     if key == "mass":
         return f"{fixed(value * 1e3, 2)} g" if value < 1.0 else f"{fixed(value, 2)} kg"
-    number = {"damping": f"{value:.2g} N s/m", "time": f"{fixed(value * 1e3, 2)} ms", "share": f"{value * 100:.2g} %"}
+    number = {
+        "damping": filled("{:.2g} N s/m", value),
+        "time": f"{fixed(value * 1e3, 2)} ms",
+        "share": filled("{:.2g} %", value * 100),
+    }
     return number.get(key) or f"{fixed(value / 1e3, 2)} N/mm"
 
 

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from haploop.tools.advise.advice import Advice
-from haploop.tools.advise.report import answer, format_attacked, format_limit, format_stiffness, moves
+from haploop.tools.advise.report import answer, format_attacked, format_limit, moves
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.withstand import WORTH
 from haploop.tools.figure import style
+from haploop.tools.render.units import format_stiffness
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

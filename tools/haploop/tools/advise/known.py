@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from haploop.plant.chain.chain import Chain
+from haploop.protocol.filled import filled
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.linear.linearity import installed_kinds, is_linear
 from haploop.tools.linear.one_tick import NeverStable, OneTickMap
@@ -45,7 +46,7 @@ def formulas(loop: Scene) -> list[Formula]:
     found = [
         Formula("K q <= 2 f_c", f"2 x {amount(friction, 'N')} / {amount(q, 'm')}" if q else "no encoder",
                 "chatters between two counts", abbott, 2.0 * friction / q if q else math.inf),
-        Formula("K <= 2 b / T", f"2 x {b:.3g} N s/m / {amount(period_s, 's')}",
+        Formula("K <= 2 b / T", filled("2 x {:.3g} N s/m / {}", b, amount(period_s, "s")),
                 "generates energy; friction or hand must absorb it", abbott, 2.0 * b / period_s),
     ]  # fmt: skip
     smooth = replace(loop, encoder=None, friction=None, noise=None, actuator=None, dissipation=())

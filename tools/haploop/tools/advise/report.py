@@ -17,7 +17,7 @@ from haploop.tools.advise.withstand import ROUGH, WORTH, Best
 from haploop.tools.linear.linearity import installed_kinds
 from haploop.tools.linear.terms import one_count
 from haploop.tools.render.terminal import make_facts, make_table
-from haploop.tools.render.units import amount, fixed
+from haploop.tools.render.units import amount, fixed, format_stiffness
 
 _NO_WALL = "none: no wall withstands every case"
 _NOTHING_BREAKS = "nothing that was tried"
@@ -237,15 +237,6 @@ def _assumed(told: Advice) -> Table:
     for of, half, double in told.assumed:
         table.add_row(of.key, of.words, format_limit(half), format_limit(double))
     return table
-
-
-def format_stiffness(stiffness_N_m: float, digits: int = 3) -> str:
-    """Formats a stiffness in N/m: ``1.42 N/mm``; softer than 0.01 N/mm in N/m; ``any`` for an infinite one."""
-    if not math.isfinite(stiffness_N_m):
-        return "any"
-    if 0.0 < stiffness_N_m < 10.0:
-        return f"{fixed(stiffness_N_m, 2)} N/m"
-    return f"{fixed(stiffness_N_m / 1e3, digits if stiffness_N_m >= 1e3 else 2)} N/mm"
 
 
 def format_limit(limit: Limit) -> str:

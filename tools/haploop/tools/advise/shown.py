@@ -14,6 +14,7 @@ from haploop.tools.advise.walls.felt import buzz, felt_force_N
 from haploop.tools.advise.walls.loops import LoneLoop
 from haploop.tools.advise.walls.trial import STRETCH_S
 from haploop.tools.linear.linearity import installed_kinds
+from haploop.tools.render.units import format_stiffness
 
 # Walls on which the case that breaks first is shown, as multiples of the wall that broke.
 _STIFFER, _UNSTEADY = (1.0, 1.05, 1.1, 1.2, 1.4, 1.7, 2.0), ("limit-cycle", "growing", "diverged")
@@ -36,7 +37,7 @@ def _shown(
     if not stiffness_N_m:
         return None
     best, scene = found.advised, case.scene(loop)
-    wall_words = f"{called}{stiffness_N_m / 1e3:.3g} N/mm"
+    wall_words = f"{called}{format_stiffness(stiffness_N_m)}"
     title = f"{subject.name}: {wall_words} with {best.family.phrase(best.values)}, {case.words}"
     assert scene.wall
     wall = replace(scene.wall, stiffness=stiffness_N_m)

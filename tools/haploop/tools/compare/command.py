@@ -81,13 +81,13 @@ def compare(
 def find(subject: Subject, grid: bool, workers: int | None, rows: Path) -> Comparison:
     """Compares the stabilizers on a subject's loop, and with ``grid`` on others like it; ``rows`` keeps the results."""
     from haploop.tools.advise.families import FORCE_BOUNDING
-    from haploop.tools.advise.report import format_stiffness
     from haploop.tools.advise.walls.cases import make_loop
     from haploop.tools.compare.bench import BESIDE, Effort
     from haploop.tools.compare.comparison import Comparison, Kept, bounded_N_m, compare, variants
     from haploop.tools.compare.conditions import COMPARED_WITH, task_words
     from haploop.tools.executor.executors import make_executor
     from haploop.tools.render.progress import bars
+    from haploop.tools.render.units import format_stiffness
 
     loop = make_loop(subject.scene, subject.has_task, COMPARED_WITH)
     loops, effort = variants(loop), Effort()

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from haploop.tools.advise.families import NOTHING
-from haploop.tools.advise.report import format_stiffness
 from haploop.tools.compare.bench import Row, family_of
 from haploop.tools.compare.comparison import Comparison, OfLoop
 from haploop.tools.compare.ranking import best, held, more, ranking, without
 from haploop.tools.compare.report import SIGNS
 from haploop.tools.figure import style
+from haploop.tools.render.units import format_stiffness
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,7 +16,6 @@ from haploop.tools.advise.families import (
     UNIDIRECTIONAL,
     Family,
 )
-from haploop.tools.advise.report import format_stiffness
 from haploop.tools.advise.subject import make_subject
 from haploop.tools.command.given import kinds_with
 from haploop.tools.command.options import FAILED, WRONG_USE, leave
@@ -36,6 +35,7 @@ from haploop.tools.compare.report import (
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.terminal import markdown_table
+from haploop.tools.render.units import format_stiffness
 
 PAGE, FIGURE = "comparison.md", "comparison.png"
 # Devices with their round trip.

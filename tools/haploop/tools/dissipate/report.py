@@ -6,6 +6,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from haploop.protocol.filled import filled
 from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.dissipate.force_book import Passivity
@@ -190,7 +191,7 @@ def note_sentences(outcome: Outcome) -> list[str]:
     for name, sentence in _COUNTS.items():
         if count := getattr(notes, name):
             percent, missing = 100.0 * count / notes.rows, amount(notes.missing_s, "s")
-            sentences.append(sentence.format(count=count, percent=percent, missing=missing))
+            sentences.append(filled(sentence, count=count, percent=percent, missing=missing))
     return [sentence for sentence in [*sentences, *doubtful(outcome)] if sentence]
 
 

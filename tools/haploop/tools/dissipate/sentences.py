@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from haploop.launch.stability.traces import is_felt
+from haploop.protocol.filled import filled
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.dissipate.swing.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, SLOWER, Buzz, Span, Word
 from haploop.tools.dissipate.swing.course import Course
@@ -132,7 +133,7 @@ def buzz_sentence(outcome: Outcome) -> str:
         words += _SHORT.format(short=amount(outcome.short_s, "s"), lasts=LASTS_S)
     words += _slower(outcome)
     if (slow := outcome.slow) and not (outcome.slower and slow.frequency_Hz > SLOWER.above_Hz):
-        words += _HAND.format(main=slow.frequency_Hz, width=amount(slow.width, "m"))
+        words += filled(_HAND, main=slow.frequency_Hz, width=amount(slow.width, "m"))
     if not (left := outcome.left_out):
         return words
     numbers = {"at": left.line.frequency_Hz, "width": amount(left.line.width, "m")}
@@ -210,7 +211,7 @@ def filtered_out(outcome: Outcome) -> list[str]:
     for name in ("velocity", "acceleration"):
         cutoff = None if name in outcome.recording.recorded else outcome.scene.estimate(name).cutoff
         if main_Hz and cutoff and cutoff <= main_Hz:
-            found.append(_FILTERED_OUT.format(name=name, cutoff=cutoff, main=main_Hz))
+            found.append(filled(_FILTERED_OUT, name=name, cutoff=cutoff, main=main_Hz))
     return found
 
 
@@ -218,5 +219,5 @@ def low_pass(outcome: Outcome) -> str:
     """Returns in words which cutoffs remove noise from the estimates but keep the swing of the motion."""
     least_Hz = _ABOVE_MAIN * (outcome.main_Hz or 0.0)
     if least_Hz > 0.25 / outcome.recording.period_s:
-        return _NO_LOW_PASS.format(main=outcome.main_Hz)
+        return filled(_NO_LOW_PASS, main=outcome.main_Hz)
     return _LOW_PASS.format(**{name: max(cutoff, least_Hz) for name, cutoff in _CUTOFFS.items()})

@@ -43,6 +43,15 @@ def fixed(value: float, digits: int = 3) -> str:
     return text.replace("-", "−")
 
 
+def format_stiffness(stiffness_N_m: float, digits: int = 3) -> str:
+    """Formats a stiffness in N/m: ``1.42 N/mm``; softer than 0.01 N/mm in N/m; ``any`` for an infinite one."""
+    if not math.isfinite(stiffness_N_m):
+        return "any"
+    if 0.0 < stiffness_N_m < 10.0:
+        return f"{fixed(stiffness_N_m, 2)} N/m"
+    return f"{fixed(stiffness_N_m / 1e3, digits if stiffness_N_m >= 1e3 else 2)} N/mm"
+
+
 def spring(stiffness_N_m: float | None) -> str:
     """Returns a stiffness in N/m without a prefix, as scene files have it."""
     if stiffness_N_m is None:

@@ -20,6 +20,7 @@ from haploop.tools.command.options import FAILED, WRONG_USE, leave, note_without
 from haploop.tools.executor.executors import ExecutorError
 from haploop.tools.executor.pool import Pool, read_sources
 from haploop.tools.machine import machine, versions
+from haploop.tools.render.units import fixed
 from haploop.tools.sweep.engine import Engine, Stopped, SweepProgress, describe_counts
 from haploop.tools.sweep.record import wants_trajectories
 from haploop.tools.sweep.store import Store, StoreError
@@ -184,7 +185,9 @@ def _first_difference(there: str, here: str) -> str:
 
 def _summary_sentences(summary: Summary) -> str:
     rate = summary["rate_1_s"]
-    lines = [f"{summary['title']}: {summary['cells']} cells, {describe_counts(summary['counts'])}, {rate:.3g} cells/s"]
+    lines = [
+        f"{summary['title']}: {summary['cells']} cells, {describe_counts(summary['counts'])}, {fixed(rate)} cells/s"
+    ]
     if provisos := summary.get("provisos"):
         told = ", ".join(f"{proviso} ({count})" for proviso, count in provisos.items())
         lines.append(f"conditions of the steady cells: {told}")

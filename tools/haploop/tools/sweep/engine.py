@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 from haploop.tools.executor.pool import Group, Pool, Stop
 from haploop.tools.executor.work import Work
 from haploop.tools.render.terminal import console
+from haploop.tools.render.units import fixed
 from haploop.tools.sweep.boundary import Boundary, Candidate, find_boundaries, verdict_is
 from haploop.tools.sweep.cells import Axis, Bisect, Extra, Item, Sweep
 from haploop.tools.sweep.record import VERDICT, wants_energy, wants_trajectories
@@ -96,7 +97,7 @@ class SweepProgress:
         else:
             self._total += len(rows)
         elapsed_s = time.monotonic() - self._began
-        rate = f"{self.ran / elapsed_s:.3g} cells/s" if self.ran else ""
+        rate = f"{fixed(self.ran / elapsed_s)} cells/s" if self.ran else ""
         done, counts = sum(self.counts.values()), describe_counts(self.counts)
         self._bars.update(self._task, completed=done, rate=rate, counts=counts)
 

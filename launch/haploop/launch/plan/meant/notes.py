@@ -5,6 +5,7 @@ from __future__ import annotations
 from haploop.launch.plan.meant.loop import LOOP, SOFTEST_N_M
 from haploop.launch.plan.meant.reach import REACH
 from haploop.launch.plan.meant.rule import Found, Note, Rule
+from haploop.protocol.filled import filled
 from haploop.protocol.plugin_file import raised_in_file
 from haploop.protocol.register import UnknownKind
 from haploop.protocol.scene.paths import value_at
@@ -35,7 +36,7 @@ def note_unmeant(scene: Scene) -> list[Note]:
     ]
     broken = [(rule, _broken(rule, scene)) for rule in RULES]
     return unusual + [
-        Note(rule.sentence.format(**found), rule.key.format(**found), rule.keeps_off)
+        Note(filled(rule.sentence, **found), rule.key.format(**found), rule.keeps_off)
         for rule, found in broken
         if found is not None
     ]
