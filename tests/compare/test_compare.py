@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from haploop.api.results import ComparisonResult
 from haploop.protocol.scene.paths import with_value
@@ -24,6 +25,7 @@ from haploop.tools.compare import bench as of_bench
 from haploop.tools.compare.bench import BESIDE, Effort, Job, Row, Shown, along, bench, gentlest
 from haploop.tools.compare.comparison import AGAIN, TOLD, Comparison, Kept, OfLoop, _each, bounded_N_m, plays
 from haploop.tools.compare.conditions import draw
+from haploop.tools.compare.figure import figure_of
 from haploop.tools.compare.page import page, places, sentences
 from haploop.tools.compare.ranking import best, choice, held, ranking
 from haploop.tools.compare.report import comparison_data, report
@@ -292,3 +294,16 @@ def test_a_comparison_tells_how_many_of_how_many_are_done_and_counts_what_was_ke
             _each(float, {"a": 1.0, "b": 2.0}, kept, executor, stage, "walls", float)
     assert told == [("walls", 2)] * 2
     assert done == ["walls"] * 4
+
+
+@pytest.mark.parametrize("name", ["omega3", "an_own_device_with_a_long_name"])
+def test_no_legend_of_the_figure_covers_the_name_of_the_device(name):
+    [loop] = compared().loops
+    figure = figure_of([replace(compared(), name=name, loops=(replace(loop, delay_s=1e-3), loop))])
+    figure.canvas.draw()
+    [title] = figure.findobj(lambda artist: isinstance(artist, Text) and artist.get_text().startswith(name))
+    legends = [legend for ax in figure.axes if (legend := ax.get_legend())]
+    assert title.get_text() == f"{name}, round trip 1 ms"
+    assert len(legends) == 3
+    assert not any(legend.get_window_extent().overlaps(title.get_window_extent()) for legend in legends)
+    assert figure.bbox.contains(*title.get_window_extent().max)

@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_WIDTH_IN, _ROW_IN, _BESIDE_IN = 11.0, 0.3, 1.7
+_WIDTH_IN, _ROW_IN, _BESIDE_IN = 11.0, 0.3, 2.0
 _GREY = "#777777"
+# Height of a legend, in points, above which the name of the device stands.
+_LEGEND_PT = 36.0
 _FORCES = {
     "ripple_N": ("ripple above 30 Hz, p-p", "|"),
     "extra_N": ("largest own force", "D"),
@@ -113,9 +115,10 @@ def _costs(ax: Axes, of: OfLoop) -> None:
     for number, (label, marker) in enumerate(_FORCES.values()):
         ax.plot([], [], marker, color=style.ELEMENTS[number], label=label, markersize=5)
     _finish(ax, "", "force, N", of, zero=False)
-    ax.set_xscale("log")
-    low, high = ax.get_xlim()
-    style.plain_numbers(ax.xaxis, (1.0,) if high > 100.0 * low else (1.0, 2.0, 5.0))
+    if ax.dataLim.x1 > 0.0:  # else no element held a wall, and there is no force to show
+        ax.set_xscale("log")
+        low, high = ax.get_xlim()
+        style.plain_numbers(ax.xaxis, (1.0,) if high > 100.0 * low else (1.0, 2.0, 5.0))
     _legend(ax)
 
 
@@ -132,7 +135,7 @@ def _interval(
 
 
 def _finish(ax: Axes, title: str, x_label: str, of: OfLoop, *, zero: bool = True) -> None:
-    style.dress(ax, title, x_label, "")
+    style.dress(ax, title, x_label, "", above_pt=_LEGEND_PT)
     rows = _rows(of)
     ax.set_yticks(range(len(rows)))
     ax.set_ylim(len(rows) - 0.4, -0.6)

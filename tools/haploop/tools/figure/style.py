@@ -52,8 +52,9 @@ def element_colour(number: int) -> str:
     return ELEMENTS[number % len(ELEMENTS)]
 
 
-def dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
-    ax.set_title(title, loc="left", fontsize=TEXT + 1, fontweight="bold", color=INK)
+def dress(ax: Axes, title: str, x_label: str, y_label: str, *, above_pt: float = 6.0) -> None:
+    """Writes title and labels in the style of all figures; the title stands so many points above the panel."""
+    ax.set_title(title, loc="left", pad=above_pt, fontsize=TEXT + 1, fontweight="bold", color=INK)
     ax.set_xlabel(x_label, fontsize=TEXT, color=INK)
     ax.set_ylabel(y_label, fontsize=TEXT, color=INK)
     ax.tick_params(labelsize=SMALL, colors=GREY, labelcolor=INK)
