@@ -186,3 +186,12 @@ def test_a_frequency_is_told_of_a_line_alone_and_both_senses_where_both_feel_it(
     )
     wide = Failure("hold x 1", 1.0, False, 5.4e-3, 11.0, 30.0, 200.0, True, None, 90.0, True, 15, 0.25)
     assert "at 30 Hz, felt as force and as motion; " in describe(wide)
+
+
+def test_how_rare_a_buzz_the_cases_may_have_missed_is_told_beside_the_answer() -> None:
+    """Of what happens in one of n cases, (1 - 1/n)^N of the tries of N cases see nothing."""
+    told = dict(answer(replace(ADVICE, found=replace(ADVICE.found, cases=2571))))["tried in"]
+    [cases, one_of] = map(int, re.findall(r"\d{2,}", told))
+    assert (cases, one_of) == (2571, 857)
+    assert (1.0 - 1.0 / one_of) ** cases == pytest.approx(0.05, abs=1e-3)
+    assert "tried in" not in dict(answer(replace(ADVICE, found=replace(ADVICE.found, stiffness_N_m=0.0))))
