@@ -55,7 +55,10 @@ def figure_of(told: Advice) -> Figure:
     for of, half, double in (row for row in told.assumed if moves(row[1], row[2], told.unchanged.limit)):
         others += [(f"{of.key} halved (assumed)", half, None), (f"{of.key} doubled (assumed)", double, None)]
     headline = textwrap.wrap(told.headline, _HEADLINE_LETTERS)
-    lines = [(name, textwrap.wrap(f"{words.rstrip('.')}.", _LETTERS)) for name, words in answer(told)]
+    lines = [
+        (name, textwrap.wrap(f"{words.rstrip('.')}.".replace(" %", "\u00a0%"), _LETTERS))
+        for name, words in answer(told)
+    ]
     rows = len(told.found.bests) + len(told.formulas) + len(told.published)
     height_in = (len(headline) + sum(len(wrapped) for _, wrapped in lines)) * _LINE_IN
     heights = [rows * _ROW_IN + _BESIDE_IN, height_in, len(others) * _ROW_IN + _BESIDE_IN]
