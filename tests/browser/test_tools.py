@@ -237,7 +237,7 @@ def test_a_slider_sets_when_it_is_let_go_and_shades_what_lies_beyond_the_limit(s
         "title", "Beyond 300 N/m the loop as it is now, without friction, quantisation and noise, is unstable."
     )
     told = page.locator("#set-fields p:has([id='set-wall.stiffness'])")
-    expect(told).to_contain_text("shaded: unstable if friction, quantisation and noise are left out")
+    expect(told).to_contain_text("shaded: above 300 N/m unstable if friction, quantisation and noise are left out")
     share = float(slider.evaluate("e => e.style.getPropertyValue('--safe')").rstrip("%"))
     assert share == pytest.approx(50 + 50 * 0.30103, abs=0.1), "log10 of 300 over 150"
     slider.focus()

@@ -50,7 +50,7 @@ def test_the_books_of_a_run_that_was_changed_in_its_last_window_do_not_stand_bes
         ({"delay": "undecided", "friction": "rests"}, "friction."),
         (
             {"delay": "rests", "friction": "swings on", "element 0 (damping)": "rests"},
-            "delay and element 0 (damping) together: taking out any one of them is enough.",
+            "delay and element 0 (damping) together: it rests without any one of them.",
         ),
         (
             {"delay": "swings on", "friction": "swings on", "all": "rests"},

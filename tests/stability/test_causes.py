@@ -250,3 +250,23 @@ def test_nine_trials_in_ten_have_the_word_of_a_scene_that_never_had_the_part() -
             alike += [does.split()[0] == word.split()[0]] if "undecided" not in (does, word) else []
     assert len(alike) >= 15
     assert 0.85 * len(alike) <= sum(alike) < len(alike)
+
+
+@pytest.mark.slow
+def test_a_part_without_which_the_loop_rests_only_until_it_is_struck_is_no_cause() -> None:
+    """Without its damping it rests after a push and swings after a blow, in an independent program by a millimetre."""
+    of = scene(
+        clock={"round_trip_delay": 0.0005}, duration=3.0, device={"mass": 0.4185984993786634, "damping": 0.0081089764},
+        encoder={"resolution": 1.4602805367427125e-05},
+        wall={"position": -0.00021417364844268625, "stiffness": 313.3458169580782},
+        hand={
+            "mass": 0.269, "damping": 6.43, "stiffness": 105.3, "grip": {"stiffness": 552.4, "damping": 3.609},
+            "force": {"kind": "ramp", "value": -0.3650772139276287, "rise_time": 0.3},
+        },
+        dissipation=[
+            {"kind": "damping", "damping": 192.57800526201706},
+            {"kind": "unidirectional-inertia", "mass": 0.014625243956522996},
+        ],
+    )  # fmt: skip
+    does = tried(of)
+    assert (does["quantisation"], does["element 0 (damping)"]) == ("rests", "undecided")

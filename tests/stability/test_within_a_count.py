@@ -10,7 +10,7 @@ from haploop.launch.scene.file import load
 from haploop.launch.stability.judge import judge
 from haploop.launch.stability.looks import LOOKS_S
 from haploop.launch.stability.still_hand import deeper_holds
-from haploop.protocol.scene.effects import Grip
+from haploop.protocol.scene.effects import Actuator, Grip
 from haploop.protocol.scene.hand_force import Constant
 from haploop.protocol.scene.scene import Encoder, Hand, Scene
 from haploop.protocol.walls.hunt_crossley import HuntCrossley
@@ -37,7 +37,10 @@ def test_without_friction_it_is_not_steady_and_held_a_part_of_a_count_deeper_it_
     assert judge(end, LOOKS_S).word == "steady"
     told = judge(end, LOOKS_S, thorough=True)
     assert (told.word, told.deeper) == ("undecided", "swings on")
-    assert f"Held {told.deeper_N:.2g} N harder, a part of an encoder's count deeper, it swings on." in told.sentence()
+    assert (
+        f"Held {told.deeper_N:.2g} N harder, by a part of a count or of a step of the force, it swings on."
+        in told.sentence()
+    )
     assert of.hand
     assert told.deeper_N
     harder = found(replace(of, hand=replace(of.hand, force=Constant(value=end.hold_N - told.deeper_N))))
@@ -54,7 +57,7 @@ def test_friction_of_0_is_none() -> None:
 def test_what_rests_at_all_places_within_a_count_is_steady_and_says_so() -> None:
     told = judge(ended(replace(premium(320.0), friction=None)), LOOKS_S, thorough=True)
     assert (told.word, told.deeper) == ("steady", "rests")
-    assert told.sentence().endswith("It also does so where it lies parts of an encoder's count deeper.")
+    assert told.sentence().endswith("It also does so held harder by parts of a count, or of a step of the force.")
 
 
 @pytest.mark.slow
@@ -93,3 +96,23 @@ def test_without_counts_or_without_a_wall_nothing_is_held_deeper() -> None:
     of = replace(scene(), encoder=None)
     assert deeper_holds(of, Spring(0.0, 900.0, -1.0), -1.0) == []
     assert deeper_holds(replace(of, encoder=Encoder(resolution=COUNT_M)), Spring(0.0, 0.0, -1.0), -1.0) == []
+
+
+def test_without_an_encoder_it_is_held_harder_by_parts_of_a_step_of_the_force() -> None:
+    of = replace(scene(), encoder=None, actuator=Actuator(resolution=0.03))
+    assert deeper_holds(of, Spring(0.0, 900.0, -1.0), -1.0) == pytest.approx([-1.01, -1.02], rel=1e-12)
+
+
+@pytest.mark.slow
+def test_what_rests_at_one_place_within_a_step_of_the_force_and_swings_at_the_next_is_not_steady() -> None:
+    """An independent program saw it swing at a quarter of a step more."""
+    push = {"kind": "ramp", "value": -1.0, "rise_time": 0.3}
+    of = scene(
+        clock={"round_trip_delay": 0.0007}, device={"mass": 0.1, "damping": 0.05}, duration=3.0,
+        hand={"mass": 0.02, "damping": 3.0, "stiffness": 30.0, "force": push},
+        wall={"position": -1e-3, "stiffness": 5181.24728213178}, actuator={"resolution": 0.03},
+        dissipation=[{"kind": "damping", "damping": 10.064019785071272}],
+    )  # fmt: skip
+    end = ended(of)
+    assert judge(end, LOOKS_S).word == "steady"
+    assert judge(end, LOOKS_S, thorough=True).word == "undecided"

@@ -70,7 +70,7 @@ def test_a_viewer_shows_one_recorded_run_and_draws_another_over_it(recorded):
         assert [past["id"] for past in viewer.listing()["past"]] == ["second", "first"]
         await viewer.open("second")
         assert viewer.listing()["overlay_end_s"] is None
-        assert await viewer.lay_over("first") == "Run first is drawn behind, to its end at 1.5 s."
+        assert await viewer.lay_over("first") == "Run first is drawn over it, to its end at 1.5 s."
         assert (viewer.listing()["shown"], viewer.listing()["overlay"]) == ("second", "first")
         assert viewer.listing()["overlay_diverged"] is False
         assert viewer.listing()["overlay_end_s"] == 1.5

@@ -43,7 +43,7 @@ class Viewer:
 
     Attributes:
         session: the run on show; None before the first.
-        overlay: a recorded run that is drawn behind it; None without.
+        overlay: a recorded run that is drawn over it; None without.
         why: a sentence on why no run is on show, if there is one.
     """
 
@@ -118,7 +118,7 @@ class Viewer:
     def listing(self) -> Message:
         """Returns the live runs and the recorded ones, looked for now and then, and which are on show.
 
-        ``overlay_diverged`` tells whether the numbers of the run drawn behind left every bound, ``overlay_end_s`` when
+        ``overlay_diverged`` tells whether the numbers of the run drawn over it left every bound, ``overlay_end_s`` when
         that run ended, ``stays`` whether the page keeps its run when that has ended.
         """
         if wall_clock.monotonic() - self._listed[0] > _LIST_S:
@@ -164,12 +164,10 @@ class Viewer:
         return f"Run {run_id} is shown."
 
     async def lay_over(self, run_id: str) -> str:
-        """Draws a recorded run behind the one on show, none for ""; raises CommandFailed as ``open`` does."""
+        """Draws a recorded run over the one on show, none for ""; raises CommandFailed as ``open`` does."""
         self.overlay = behind = await self._read(run_id) if run_id else None
         return (
-            f"Run {run_id} is drawn behind, to its end at {behind.end_s:g} s."
-            if behind
-            else "No other run is drawn behind."
+            f"Run {run_id} is drawn over it, to its end at {behind.end_s:g} s." if behind else "No other run is drawn."
         )
 
     async def _read(self, run_id: str) -> RunSession:

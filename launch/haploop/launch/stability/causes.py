@@ -9,7 +9,7 @@ from haploop.controller.controller import Controller
 from haploop.launch.plan.idealised import HOLD, OF_TABLES, faster, idealised, uncontrolled
 from haploop.launch.plan.rules import has_friction
 from haploop.launch.stability.finding import DOES, Finding
-from haploop.launch.stability.looks import LOOKS_S, push_of
+from haploop.launch.stability.looks import BLOWS, LOOKS_S, is_struck, push_of
 from haploop.launch.stability.still_hand import End, depth_of, held, press_of
 from haploop.launch.stability.watch import watch
 from haploop.plant.plant import Plant
@@ -35,13 +35,13 @@ def with_causes(end: End, found: Finding) -> Finding:
 
     The loop as it stood at the end of the run begins anew: the hand holds it still, without noise, at the depth where
     the wall balances the hand; the device moves as fast as its swing did, v = pi f w for a width w at f Hz. It is
-    pushed as for the verdict and watched for up to 16 s, or 40 000 ticks, once as it is and once without each part (see
-    ``idealised`` and ``uncontrolled``) and at a higher control rate (``HOLD``). Where no element alone makes a
-    difference, it is tried without all of them (``ELEMENTS``); where no single part makes it rest, without all at once
-    (``ALL``). Nothing is told of a wall that does not hold the hand, nor if the loop as it is, from this start,
-    comes to another swing than in its run, to none, or leaves the limit where the run did not, or the reverse. Of a
-    device that left its limit, nothing without its parts (``{}``) is told where the hand presses harder than the wall
-    answers within the limit, or than the actuator can.
+    pushed as for the verdict, struck if it rests, and watched for up to 16 s, or 40 000 ticks, once as it is and once
+    without each part (see ``idealised`` and ``uncontrolled``) and at a higher control rate (``HOLD``). Where no element
+    alone makes a difference, it is tried without all of them (``ELEMENTS``); where no single part makes it rest,
+    without all at once (``ALL``). Nothing is told of a wall that does not hold the hand, nor if the loop as it is, from
+    this start, comes to another swing than in its run, to none, or leaves the limit where the run did not, or the
+    reverse. Of a device that left its limit, nothing without its parts (``{}``) is told where the hand presses harder
+    than the wall answers within the limit, or than the actuator can.
 
     A swing less than a third as wide, or less than a tenth at another frequency, is less (``LESS``), one that lasts
     where the loop as it is leaves its limit is ``WITHIN`` it; one at a frequency 1.5 times off is another, which takes
@@ -116,12 +116,17 @@ def _without_all(scene: Scene) -> Scene:
 
 
 def _watched(end: End, scene: Scene) -> Finding:
-    """Returns what a loop does from its beginning, held as at the end of the run."""
+    """Returns what a loop does from its beginning, held as at the end of the run; what rests is also struck."""
     time = Timebase.from_scene(scene)
     plant, controller = Plant(scene, time), Controller(scene, time, end.controller.kinds)
     looks_s = [look_s for look_s in LOOKS_S if look_s * time.control_rate <= _MOST_TICKS] or LOOKS_S[:1]
     begun = End(scene, time, plant, controller, end.hold_N, on_exchange=end.on_exchange)
-    return watch(begun, (push_of(end.hold_N, scene.hand, begun.wall_m),), looks_s)[0]
+    push_N = push_of(end.hold_N, scene.hand, begun.wall_m)
+    found = watch(begun, (push_N,), looks_s)[0]
+    for blow in BLOWS:
+        if is_struck(found):
+            found = found.after_blow(watch(begun, (push_N * blow,), looks_s)[0])
+    return found
 
 
 def _does(changed: Finding, as_is: Finding) -> str:

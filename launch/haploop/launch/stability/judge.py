@@ -12,6 +12,7 @@ from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element
 from haploop.launch.plan.rules import has_friction
 from haploop.launch.scene.events import scene_events
+from haploop.launch.stability.between_ticks import BETWEEN_TICKS, rings_between_ticks
 from haploop.launch.stability.causes import with_causes
 from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.looks import (
@@ -155,7 +156,10 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
     # What a window shows of a loop that was changed within it is not the loop that was judged.
     shown = "oscillation_m", "force_ripple_N"
     seen_m, ripple_N = (window.get(name) if window.get("changed_s") is None else None for name in shown)
-    summary = finite(summary | finding.entries(seen_m, beside, ripple_N))
+    told = finding.entries(seen_m, beside, ripple_N)
+    if finding.word in ("steady", "limit-cycle") and rings_between_ticks(scene):
+        told["stability"]["provisos"] += [BETWEEN_TICKS]
+    summary = finite(summary | told)
     if out:
         write_summary(summary, out)
     return summary

@@ -27,7 +27,7 @@ _HOLD_S, _LATEST_S = 0.25, 60.0
 _HARDER = 1.2
 # A hand that presses with less holds nothing.
 LEAST_PRESS_N = 1e-3
-# Parts of an encoder's count by which a loop that rests is held deeper.
+# Parts of a count, or of a step of the force, by which a loop that rests is held deeper.
 _DEEPER = (1.0 / 3.0, 2.0 / 3.0)
 
 
@@ -160,7 +160,9 @@ def press_of(hold_N: float, hand: Hand | None, wall_m: float) -> float:
 
 
 def deeper_holds(scene: Scene, wall: Wall, hold_N: float) -> list[float]:
-    """Returns holds at which the device rests a third and two thirds of an encoder's count deeper, N; none without one.
+    """Returns holds at which the device rests a third and two thirds of an encoder's count deeper, N.
+
+    Without an encoder, they are harder by these parts of a step of the actuator's force; none without that, too.
 
     The response of a wall behind an encoder depends on where within a count the device rests: a loop that rests at one
     hold may chatter at the next. The missing force is that of wall and hand on the way, at most V'(p + q) - V'(p) and
@@ -168,10 +170,13 @@ def deeper_holds(scene: Scene, wall: Wall, hold_N: float) -> list[float]:
     grip.
     """
     press_N = press_of(hold_N, scene.hand, wall.position)
-    if scene.encoder is None or not wall.inward:
+    if not wall.inward:
         return []
-    count_m, depth_m = scene.encoder.resolution, depth_of(wall, abs(press_N))
-    count_N = wall.held(depth_m + count_m) - wall.held(depth_m) + _stiffness_of(scene.hand) * count_m
+    if scene.encoder:
+        count_m, depth_m = scene.encoder.resolution, depth_of(wall, abs(press_N))
+        count_N = wall.held(depth_m + count_m) - wall.held(depth_m) + _stiffness_of(scene.hand) * count_m
+    else:
+        count_N = (scene.actuator and scene.actuator.resolution) or 0.0
     return [hold_N + math.copysign(part * count_N, press_N) for part in _DEEPER] if count_N > 0.0 else []
 
 

@@ -48,9 +48,9 @@ AT_HARDEST = {
     "undecided": " Whether it also does so at the hand's hardest hold, {hardest_N:.3g} N, could not be determined.",
 }
 DEEPER = {
-    "rests": " It also does so where it lies parts of an encoder's count deeper.",
-    "swings on": " Held {deeper_N:.2g} N harder, a part of an encoder's count deeper, it swings on.",
-    "undecided": " Whether it also does so when held {deeper_N:.2g} N harder, a part of an encoder's count deeper, "
+    "rests": " It also does so held harder by parts of a count, or of a step of the force.",
+    "swings on": " Held {deeper_N:.2g} N harder, by a part of a count or of a step of the force, it swings on.",
+    "undecided": " Whether it also does so held {deeper_N:.2g} N harder, by a part of a count or of a step of force, "
     "could not be determined.",
 }
 LASTS, GROWS = "a swing of {} peak to peak would last", "its swing would grow"

@@ -12,7 +12,7 @@ from haploop.view.look.book_names import book_names
 from haploop.view.store.history import EARLIER, TRUE, WALL_BOOK, History
 
 # Books of the plant in the order in which they are reported; labels of books that do not go by their own name.
-_STORED = ("kinetic", "spring", "actuator")
+_STORED = ("kinetic", "spring")
 _LABELS = {"unmodelled_work": "hand, as the remainder", EARLIER.removesuffix(TRUE): "earlier elements"}
 # The wall's share by cause: label, the book it goes up to and the book it starts from.
 _OF_WALL = (
@@ -26,7 +26,8 @@ def budget(history: History, from_tick: int, end: int) -> dict[str, Any] | None:
     """Returns every cause with its energy in J, negative where it feeds the device, positive where it takes energy out.
 
     ``rows`` are {name, total_J, window_J}: since the start of the run, and in the ticks from ``from_tick`` to before
-    ``end``. They sum to 0 but for rounding, since the books close: what is put into store counts as taken out.
+    ``end``. They sum to 0 but for rounding, since the books close: what is put into store counts as taken out, and so
+    does what the wall's and the elements' commanded forces would have given, but for the actuator's limits.
     ``from_s`` is where the window begins, later than requested where no energy is known before; it is exact to within
     ``about_s`` where the past is held coarsely. Returns None without any energy.
     """
@@ -74,5 +75,7 @@ def _causes(names: Sequence[str], labels: Mapping[str, str]) -> Iterator[tuple[s
     for name in names:
         if name.endswith("_heat"):
             yield f"heat in {name.removesuffix('_heat')}", [(1.0, name)]
+    if "actuator" in names:
+        yield "kept back by the actuator's limits", [(1.0, "actuator")]
     stored = [*(name for name in _STORED if name in names), *(["ideal"] if has_wall else [])]
     yield "put into store", [(1.0, name) for name in stored]

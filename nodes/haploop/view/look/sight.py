@@ -121,7 +121,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     elif crossings >= CROSSINGS and rests:
         word, why = "dying away", "over"
     elif crossings >= CROSSINGS:
-        word = "dying away" if growth < _DIES else "growing" if growth > _GROWS else "swinging"
+        word = _course(recent[0] if recent is newest else recent[0, ::n], growth, swing_m)
     elif width > _REST * swing_m:
         word = "moving"
     elif ripples[0][1]:
@@ -168,6 +168,15 @@ def _ripples(force: np.ndarray, size: int) -> list[tuple[float, bool]]:
     widths = [float(np.ptp(about_trend(window))) for window in windows]
     least = [max(_LEAST_RIPPLE_N, _RIPPLE * float(np.abs(window).max())) for window in windows]
     return [(width, width > above) for width, above in zip(widths, least, strict=True)]
+
+
+def _course(x: np.ndarray, growth: float, swing_m: float) -> str:
+    """Returns the word for a swing by the growth from half to half of its trace x, m, which its second half must share:
+    what a contact sets off may be half as wide in the second half, and go on there for good."""
+    later = _swings(x[len(x) // 2 :], swing_m)[1]
+    if growth < _DIES and later < _DIES**0.5:
+        return "dying away"
+    return "growing" if growth > _GROWS and later > _GROWS**0.5 else "swinging"
 
 
 def _swings(x: np.ndarray, swing_m: float) -> tuple[int, float]:

@@ -237,7 +237,7 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     if blown := found.get("blown"):
         rows.append(("after a blow", f"of {amount(found['blow_N'], 'N')}: {blown}"))
     if deeper := found.get("deeper"):
-        rows.append(("deeper within a count", f"held {amount(found['deeper_N'], 'N')} harder: {deeper}"))
+        rows.append(("held a little harder", f"by {amount(found['deeper_N'], 'N')}: {deeper}"))
     if frictionless := found.get("frictionless"):
         rows.append(("without its friction", frictionless))
     return rows

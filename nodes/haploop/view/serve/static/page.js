@@ -92,7 +92,7 @@ function showState() {
   const goesOn = Boolean(state.options) && !state.summary;
   byId("swap").hidden = byId("set").hidden = byId("to-forms").hidden = !goesOn;
   byId("undo").hidden = !goesOn || !marks.some(({ changes }) => changes);
-  byId("nothing-yet").hidden = goesOn || Boolean(state.summary);
+  byId("nothing-yet").hidden = goesOn || Boolean(state.summary) || ["ended", "failed"].includes(phase());
   if (state.options) {
     swapForm.update(state.options);
     setForm.update(state.options, state);

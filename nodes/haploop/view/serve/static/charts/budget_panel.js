@@ -5,6 +5,7 @@ import { make, put } from "../dom.js";
 
 const MODES = [["total", "since start"], ["window", "window"], ["power", "power"]];
 const STORE = "put into store";
+const KEPT = "kept back by the actuator's limits";
 
 export class BudgetPanel {
   /** @param {HTMLElement} host takes the bars. */
@@ -56,7 +57,7 @@ export class BudgetPanel {
 
   words(from, to, about) {
     if (!this.budget) return "No energy is known yet.";
-    const since = this.mode === "total" ? "Since the start of the run" : `From ${from.toFixed(3)} to ${to.toFixed(3)} s`;
+    const since = this.mode === "total" ? `From the start of the run to ${to.toFixed(3)} s` : `From ${from.toFixed(3)} to ${to.toFixed(3)} s`;
     const rough = about && this.mode !== "total" ? `, its beginning within ${amount(about, "s")}` : "";
     return `${since}${rough}. The bars sum to zero: the books close.`;
   }
@@ -64,7 +65,7 @@ export class BudgetPanel {
   add(name) {
     const bar = make("span", { class: "bar" });
     const value = make("output");
-    const row = make("div", name === STORE ? { class: "store" } : {}, make("dt", {}, name), make("dd", {}, make("span", { class: "track" }, bar), value));
+    const row = make("div", name === STORE || name === KEPT ? { class: "store" } : {}, make("dt", {}, name), make("dd", {}, make("span", { class: "track" }, bar), value));
     this.rows.set(name, { row, bar, value });
     this.list.append(row);
   }
@@ -82,6 +83,7 @@ export class BudgetPanel {
 
   verb(name, value, isNothing) {
     if (isNothing) return "about nothing,";
+    if (name === KEPT) return "commanded, but not given:";
     if (name === STORE) return value < 0 ? "given back from store" : "put into store";
     return value < 0 ? "feeds the device" : "takes out of the device";
   }

@@ -9,7 +9,7 @@ import { TimeChart } from "./time_chart.js";
 
 const CHARTS = {
   position: { label: "position", unit: "m", prefix: "m", least: 1e-5, zero: false, times: false },
-  force: { label: "force", unit: "N", prefix: "", least: 1e-3, zero: true, times: false },
+  force: { label: "command", unit: "N", prefix: "", least: 1e-3, zero: true, times: false },
   energy: { label: "energy", unit: "J", prefix: "m", least: 1e-9, zero: true, times: true },
 };
 const NO_TIMES = new Float64Array(0);

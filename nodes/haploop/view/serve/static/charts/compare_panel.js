@@ -2,7 +2,7 @@
 
 import { amount, amounts, NONE } from "../drawing/amounts.js";
 import { make, put } from "../dom.js";
-import { frequency, SWINGS } from "../words/header.js";
+import { frequency, isSwinging } from "../words/header.js";
 import { colour } from "../drawing/palette.js";
 
 const SIDES = ["before", "after"];
@@ -13,7 +13,7 @@ const FIGURES = [
   ["swing p-p", ({ oscillation_m: width }) => amount(width, "m")],
   ["at", frequency],
   ["applied force p-p", ({ force_swing_N: swing }) => amount(swing, "N")],
-  ["displayed stiffness", ({ word, stiffness_N_m: k }) => (SWINGS.has(word) ? NONE : amount(k, "N/m"))],
+  ["displayed stiffness", (sight) => (isSwinging(sight) ? NONE : amount(sight.stiffness_N_m, "N/m"))],
 ];
 
 export class ComparePanel {

@@ -9,6 +9,7 @@ import { newest } from "../snapshot.js";
 
 const HEIGHT = 170;
 const LANE = 0.45;
+const COARSE = "No picture: for this time only the minimum and maximum of each interval are kept here.";
 const BODIES = { x: ["device", "ink", 9], tip_x: ["tip", "tip", 7], hand_x: ["hand", "hand", 13] };
 
 export class MotionPanel {
@@ -44,7 +45,7 @@ export class MotionPanel {
     bodies.forEach((body, i) => this.body(ctx, body, across(body.at), i, ratio));
     const total = force?.columns.find(({ name }) => name === "total");
     const depth = (bodies[0].at - face) * (wall?.into_wall ?? 0);
-    if (!Number.isFinite(bodies[0].at)) return this.tell("Not received yet.");
+    if (!Number.isFinite(bodies[0].at)) return this.tell(snapshot.coarse ? COARSE : "Not received yet.");
     const where = depth > 0 ? `${amount(depth, "m")} inside the wall` : "outside the wall";
     return this.tell(`${Number.isFinite(face) ? where : "no wall"}; ${amount(high - low, "m")} across${total ? `; force ${amount(newest(total), "N")}` : ""}`);
   }

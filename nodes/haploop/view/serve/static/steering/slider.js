@@ -27,15 +27,21 @@ export class Slider {
 
   /** Show the present number and its limit, in SI, or why none is known; no slider for a number that is not above zero. */
   show(value, limit = null, why = "") {
-    put(this.why, limit ? "shaded: unstable if friction, quantisation and noise are left out" : why ? `no limit is shaded: ${why}` : "");
     this.input.hidden = !(value > 0);
-    if (this.input.hidden) return;
+    if (this.input.hidden) return put(this.why, "");
     if (!this.field.touched && (this.centre === 0 || Math.abs(Math.log10(value / this.centre)) > 0.7)) this.centre = value;
     if (!this.field.touched && document.activeElement !== this.input) this.input.value = String(Math.round(STEPS * Math.log10(value / this.centre)));
+    put(this.why, limit ? this.told(limit) : why ? `no limit is shaded: ${why}` : "");
     if (limit === this.limit && this.shadedFor === this.centre) return;
     Object.assign(this, { limit, shadedFor: this.centre });
     const share = limit ? 50 + 50 * Math.log10(limit / this.centre) : 100;
     this.input.style.setProperty("--safe", `${Math.min(100, Math.max(0, share))}%`);
     this.input.title = limit ? `Beyond ${amount(limit, this.field.quantity.unit)} the loop as it is now, without friction, quantisation and noise, is unstable.` : "";
+  }
+
+  /** Where the limit is, in words: a finger cannot hover. */
+  told(limit) {
+    const isOff = Math.log10(limit / this.centre) >= 1;
+    return `${isOff ? "not on this scale" : "shaded"}: above ${amount(limit, this.field.quantity.unit)} unstable if friction, quantisation and noise are left out`;
   }
 }

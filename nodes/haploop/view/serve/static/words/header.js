@@ -10,8 +10,9 @@ const SIGNS = {
   swinging: "limit-cycle", growing: "growing", "force ripples": "limit-cycle", "no contact": "no-contact",
   "not finite": "diverged",
 };
-/** Words for swings. */
-export const SWINGS = new Set(["swinging", "growing", "dying away"]);
+const SWINGS = new Set(["swinging", "growing", "dying away"]);
+/** Whether a swing is seen, or would be if that lasted. */
+export const isSwinging = (sight) => SWINGS.has(sight?.word) || SWINGS.has(sight?.so_far_word);
 const NOT_YET = { awaited: "being judged", unknown: "not known" };
 
 /** The state of the verdict, in a word. */
@@ -81,8 +82,8 @@ function seen(sight) {
   return soFar ? `so far: ${steady(to - from, 2)} of 0.5 s` : `in ${steady(from, 2)}–${steady(to, 2)} s`;
 }
 
-function stiffness({ displayed_stiffness_N_m: displayed, wall, sight }) {
-  if (SWINGS.has(sight?.word)) return NONE; // force over depth of a swing is no stiffness
+function stiffness({ displayed_stiffness_N_m: displayed, wall, sight, verdict }) {
+  if (isSwinging(sight) || verdict === "diverged") return NONE; // force over depth of a swing is no stiffness
   const isSpring = isNumber(displayed) && wall?.into_wall && !wall.kind;
   return isSpring ? amountOf(displayed, wall.stiffness, "N/m") : amount(displayed, "N/m");
 }

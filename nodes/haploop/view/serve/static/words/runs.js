@@ -1,4 +1,4 @@
-// The runs, live ones and those that were recorded. One is on show, another may be drawn behind it.
+// The runs, live ones and those that were recorded. One is on show, another may be drawn over it.
 
 import { plain } from "../drawing/amounts.js";
 import { byId, make, put } from "../dom.js";
@@ -85,4 +85,4 @@ const words = ({ id, title, told }, name = id) => [title === id ? name : `${name
 const group = (label, runs) => make("optgroup", { label }, ...runs.map(option));
 
 /** Shown while there is no run. */
-const none = () => make("option", { value: "", hidden: "" }, "none on show");
+const none = () => make("option", { value: "", hidden: "", disabled: "" }, "none on show");
