@@ -301,7 +301,8 @@ def test_no_legend_of_the_figure_covers_the_name_of_the_device(name):
     [loop] = compared().loops
     figure = figure_of([replace(compared(), name=name, loops=(replace(loop, delay_s=1e-3), loop))])
     figure.canvas.draw()
-    [title] = figure.findobj(lambda artist: isinstance(artist, Text) and artist.get_text().startswith(name))
+    words = [text for text in figure.findobj(Text) if isinstance(text, Text)]
+    [title] = [text for text in words if text.get_text().startswith(name)]
     legends = [legend for ax in figure.axes if (legend := ax.get_legend())]
     assert title.get_text() == f"{name}, round trip 1 ms"
     assert len(legends) == 3

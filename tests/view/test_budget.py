@@ -75,3 +75,14 @@ def test_what_the_law_of_a_wall_takes_is_a_cause_of_its_own_and_no_leak(tmp_path
     assert total["law of the wall"] == pytest.approx(of_wall["dissipated_J"], rel=0.02)
     assert total["sampling and hold"] == pytest.approx(of_wall["leak"]["sampling_and_hold_J"], rel=0.02)
     assert abs(sum(total.values())) < 1e-12 * summary["energy"]["moved_J"]
+
+
+def test_what_the_actuators_limits_kept_back_is_not_said_to_be_in_store(tmp_path):
+    """It was said of 19.7 J that no spring and no mass ever held."""
+    history, summary = recorded(tmp_path, **{"actuator.saturation": 0.3})
+    found = budget(history, 0, history.end_tick)
+    assert found
+    total = {row["name"]: row["total_J"] for row in found["rows"]}
+    assert total["kept back by the actuator's limits"] == pytest.approx(summary["energy"]["actuator_J"], rel=0.02)
+    assert total["kept back by the actuator's limits"] > 0.0
+    assert abs(sum(total.values())) < 1e-12 * summary["energy"]["moved_J"]

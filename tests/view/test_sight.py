@@ -104,6 +104,12 @@ def test_growth_and_decay_have_words_of_their_own():
     assert seen(lambda t: np.where(t > 2.9, np.nan, -1e-3)).word == "not finite"
 
 
+def test_a_swing_that_goes_on_after_what_the_contact_set_off_has_died_is_not_said_to_die_away():
+    """In the half second the second half is a tenth as wide as the first, and no longer decays."""
+    wide = lambda t: 1e-4 + 1e-3 * np.exp(-20.0 * np.maximum(t - 2.5, 0.0))  # noqa: E731
+    assert seen(lambda t: -5e-3 + wide(t) * np.sin(2 * np.pi * 30 * t)).word == "swinging"
+
+
 def test_a_swing_that_is_over_is_told_to_have_died_until_two_seconds_show_none_of_it():
     def stops(at_s):
         return seen(lambda t: -5e-3 + np.where(t < at_s, 1e-3 * np.sin(2 * np.pi * 30 * t), 0.0))
