@@ -50,3 +50,22 @@ def test_a_side_of_a_change_that_was_not_received_is_not_held_and_no_number_that
     tick, before, after = pair
     assert after
     assert (tick, before, after.sight.word) == (1000, None, "swinging")
+
+
+@pytest.mark.parametrize("f", [17.3, 30.5, 41.7])
+def test_energy_that_goes_to_and_fro_in_a_swing_gives_neither_side_of_a_change_a_power(f):
+    """Kinetic energy of a sine, cos²: over a part of a period more it gives up to 2 mW."""
+    history, changes = history_of(sine(f, 1e-3), lambda t: 0.1), Changes(COUNT_M)
+    t = np.arange(3000) / 1e3
+    history.append_energy(0, {"kinetic": 1e-3 * np.cos(2 * np.pi * f * t) ** 2, "hand_work": 2e-3 * t})
+    changes.note(history, [(1000, {"swap": {"kind": "damping"}})])
+    pair = changes.pair(history)
+    assert pair
+    for side in pair[1:]:
+        assert side
+        assert side.budget
+        lasts_s = side.budget["to_s"] - side.budget["from_s"]
+        power_W = {row["name"]: row["window_J"] / lasts_s for row in side.budget["rows"]}
+        assert 0.5 - 1.0 / f < lasts_s <= 0.5
+        assert abs(power_W["put into store"]) < 2e-4
+        assert power_W["hand"] == pytest.approx(-2e-3, rel=1e-9)

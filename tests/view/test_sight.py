@@ -115,7 +115,7 @@ def test_a_swing_that_is_over_is_told_to_have_died_until_two_seconds_show_none_o
         return seen(lambda t: -5e-3 + np.where(t < at_s, 1e-3 * np.sin(2 * np.pi * 30 * t), 0.0))
 
     over, gone = stops(2.45), stops(0.99)
-    assert (over.word, over.oscillation_m, over.rests) == ("dying away", 0.0, True)
+    assert (over.word, over.oscillation_m, over.rests) == ("died away", 0.0, True)
     assert "by more than 10 µm; in the last 0.5 s it did not." in over.why
     assert (gone.word, gone.oscillation_m, gone.frequency_Hz) == ("no swing seen", 0.0, None)
     assert "In the last 2 s the position stayed within 0 µm" in gone.why
@@ -127,7 +127,7 @@ def test_a_swing_of_the_force_that_is_over_is_told_too_until_two_seconds_show_no
         return seen(deep, lambda t: 0.5 + np.where(t < at_s, 0.1 * np.sin(700.0 * t), 0.0))
 
     over, gone = stops(2.45), stops(0.99)
-    assert (over.word, over.ripple_N) == ("dying away", pytest.approx(0.0, abs=1e-12))
+    assert (over.word, over.ripple_N) == ("died away", pytest.approx(0.0, abs=1e-12))
     assert over.why.endswith("in the last 2 s the force rippled by 0.202 N, in the last 0.5 s by 0 N.")
     assert (stops(2.7).word, gone.word) == ("force ripples", "no swing seen")
 
@@ -151,9 +151,9 @@ def test_whatever_moved_or_rippled_in_the_last_two_seconds_is_never_unseen(seed)
 
     for kind in ("push", "burst", "slow"):
         found = seen(lambda t, kind=kind: -5e-3 + size * moves(t, kind))
-        assert found.word in ("swinging", "growing", "dying away", "moving"), kind
+        assert found.word in ("swinging", "growing", "dying away", "died away", "moving"), kind
     ripple = seen(deep, lambda t: 0.5 + 0.1 * moves(t, "burst"))
-    assert ripple.word in ("dying away", "force ripples")
+    assert ripple.word in ("died away", "force ripples")
 
 
 @pytest.mark.parametrize("seed", [*range(10), *slowly(range(10, 30))])

@@ -56,7 +56,8 @@ class Changes:
         newest = history.steps.rows(("x", "force"), max(first, history.steps.end_tick - 1), history.steps.end_tick)
         if np.isnan(traces[:, -1]).any() and np.isfinite(newest).all():
             return None  # not received: what is no number stays so to the end
-        return Half(seen, budget(history, first, end), traces[:, ::n])
+        whole = end - 1 - _whole_periods(end - 1 - first, seen.frequency_Hz, history.time.control_rate)
+        return Half(seen, budget(history, whole, end), traces[:, ::n])
 
     def sight(self, history: History) -> Sight | None:
         """Returns what the newest ticks show since the last change; None before there are any."""
@@ -72,6 +73,15 @@ class Changes:
         if not (tick := self.since(end)):
             return None
         return tick, self._before.get(tick), self._half(history, tick, end)
+
+
+def _whole_periods(ticks: int, frequency_Hz: float | None, rate: int) -> int:
+    """Returns the most ticks that hold whole periods of a swing; all of them without one, or of less than one period.
+
+    Over a part of a period the energy that goes to and fro hides what is fed and taken on the whole.
+    """
+    periods = int(ticks / rate * (frequency_Hz or 0.0))
+    return round(periods / frequency_Hz * rate) if periods and frequency_Hz else ticks
 
 
 def last_tick(history: History) -> int:

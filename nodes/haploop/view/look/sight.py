@@ -16,7 +16,7 @@ from haploop.view.store.history import History
 # these ratios of the two halves.
 _LONG = 4
 _DIES, _GROWS = 0.5, 2.0
-_SWINGS = ("dying away", "growing", "swinging")
+_SWINGS = ("died away", "dying away", "growing", "swinging")
 # At rest, the position stays within this multiple of what counts as a swing, once to either side, plus rounding. The
 # force stays within this share of the largest.
 _REST, _RIPPLE, _LEAST_RIPPLE_N = 2.0 + 1e-6, 0.02, 1e-3
@@ -119,7 +119,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     if not inside[-window:].any():
         word = "no contact"
     elif crossings >= CROSSINGS and rests:
-        word, why = "dying away", "over"
+        word, why = "died away", "over"
     elif crossings >= CROSSINGS:
         word = _course(recent[0] if recent is newest else recent[0, ::n], growth, swing_m)
     elif width > _REST * swing_m:
@@ -127,7 +127,7 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     elif ripples[0][1]:
         word = "force ripples"
     elif any(counts for _, counts in ripples):
-        word, why = "dying away", "ripple over"
+        word, why = "died away", "ripple over"
     else:
         word = "no swing seen"
     so_far_word, word = word, "settling" if so_far else word

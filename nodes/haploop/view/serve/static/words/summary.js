@@ -78,7 +78,7 @@ function rows(texts) {
 }
 
 /** Every book with what it took as sampled and in truth. */
-function books({ wall = {}, elements = [], moved_J: moved, residual_J: residual, unmodelled_work_J: unmodelled }) {
+function books({ wall = {}, elements = [], actuator_J: kept, moved_J: moved, residual_J: residual, unmodelled_work_J: unmodelled }) {
   const head = ["book", "sampled", "true"].map((text) => make("th", { scope: "col" }, text));
   const rows = [["wall", wall.sampled_J, wall.true_J]];
   for (const [key, words] of Object.entries(CAUSES)) {
@@ -89,6 +89,7 @@ function books({ wall = {}, elements = [], moved_J: moved, residual_J: residual,
   for (const { kind, from_tick: from, to_tick: to, sampled_J, true_J } of elements) {
     rows.push([`${kind}, ticks ${from} to ${to}`, sampled_J, true_J]);
   }
+  if (kept) rows.push(["kept back by the actuator's limits", undefined, kept]); // the books above are of commanded forces
   const left = isNumber(unmodelled) ? ["hand, as the remainder", undefined, unmodelled] : ["residual", undefined, residual];
   rows.push(["moved in total", undefined, moved], left);
   const cell = (value) => make("td", {}, value === undefined ? "" : amount(value, "J"));
