@@ -50,6 +50,13 @@ def test_the_terminal_says_the_word_first_and_then_why(run):
     assert any(line.startswith("its force ripples by") for line in lines)
 
 
+def test_a_moving_hand_is_told_beside_the_word_as_it_is_in_the_runs_own_summary(run):
+    directory = run("launch/scenes/premium_tap.toml")
+    provisos = json.loads(haploop("judge", str(directory), "--json").stdout)["provisos"]
+    assert provisos == ["only friction holds it", "at some holds of its hand"]
+    assert set(provisos) <= set(json.loads((directory / "summary.json").read_text())["stability"]["provisos"])
+
+
 def test_a_run_out_of_contact_is_called_so(run):
     directory = run("launch/scenes/fig6a.toml", "--set", "wall.position=-0.5")
     assert json.loads(haploop("judge", str(directory), "--json").stdout)["word"] == "no-contact"

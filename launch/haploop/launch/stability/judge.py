@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -152,17 +153,28 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
     else:
         return summary
     window = summary["window"]
-    beside = moved_beside(scene, window["from_s"])
     # What a window shows of a loop that was changed within it is not the loop that was judged.
     shown = "oscillation_m", "force_ripple_N"
     seen_m, ripple_N = (window.get(name) if window.get("changed_s") is None else None for name in shown)
-    told = finding.entries(seen_m, beside, ripple_N)
-    if finding.word in ("steady", "limit-cycle") and rings_between_ticks(scene):
-        told["stability"]["provisos"] += [BETWEEN_TICKS]
-    summary = finite(summary | told)
+    summary = finite(summary | entries_of(finding, scene, window["from_s"], seen_m, ripple_N))
     if out:
         write_summary(summary, out)
     return summary
+
+
+def entries_of(
+    finding: Finding, scene: Scene, from_s: float, seen_m: float | None = None, ripple_N: float | None = None
+) -> dict[str, Any]:
+    """Returns the entries of a finding in a summary, with the provisos that follow from the run and its scene.
+
+    Args:
+        from_s: when the run's last window began.
+        seen_m, ripple_N: how far the run itself swung there, and its command, see ``Finding.entries``.
+    """
+    told = finding.entries(seen_m, moved_beside(scene, from_s), ripple_N)
+    if finding.word in ("steady", "limit-cycle") and rings_between_ticks(scene):
+        told["stability"]["provisos"] += [BETWEEN_TICKS]
+    return told
 
 
 def judge(

@@ -144,7 +144,8 @@ def judge(directory: Directory, json: Json = False) -> None:
     diverged, no-contact or undecided.
     """
     from haploop.launch.runs.replay import ReplayError, demand_own, logged_run, repeatable
-    from haploop.launch.stability.judge import judge_scene
+    from haploop.launch.stability.judge import entries_of, judge_scene
+    from haploop.logger.verdict.measures import WINDOW_S
     from haploop.protocol.transport.prints import unheard
     from haploop.tools.render.report import finding_table
     from haploop.tools.render.terminal import console
@@ -157,12 +158,13 @@ def judge(directory: Directory, json: Json = False) -> None:
                 scene, kinds, events = repeatable(directory, recorded)
                 demand_own(recorded, scene)
                 finding = judge_scene(scene, kinds, events, thorough=True, causes=True)
+                found = entries_of(finding, scene, scene.duration - WINDOW_S)["stability"]
         except ReplayError as error:
             leave(str(error), WRONG_USE)
     if json:
-        print_json(dataclasses.asdict(finding) | {"sentence": finding.sentence()})
+        print_json(dataclasses.asdict(finding) | {"sentence": finding.sentence(), "provisos": found["provisos"]})
     else:
-        console().print(finding_table(finding))
+        console().print(finding_table(finding, found))
 
 
 def export(

@@ -201,12 +201,11 @@ def _provisos(found: Summary) -> str:
     return "".join(f", {proviso}" for proviso in found.get("provisos", ()))
 
 
-def finding_table(finding: Finding) -> RenderableType:
-    """Makes the report of a judged run: the word, why, and what it rests on."""
+def finding_table(finding: Finding, found: Summary) -> RenderableType:
+    """Makes the report of a judged run: the word, why, and what it rests on; ``found`` is its ``stability`` entry."""
     from rich.console import Group
     from rich.text import Text
 
-    found = finding.entries()["stability"]
     head = Text.assemble((finding.word, verdict_style(finding.word)), (_provisos(found), "bold yellow"))
     parts: list[RenderableType] = [head, Text(finding.sentence())]
     if tried := by_trial(finding.without):
