@@ -20,7 +20,6 @@ def rings_between_ticks(scene: Scene) -> bool:
     """
     if not scene.transmission:
         return False
-    chain = Chain.from_scene(scene)
-    poles = np.linalg.eigvals(chain.rates()[:, : len(chain.states)].astype(float))
+    poles = Chain.from_scene(scene).poles()
     swings = -poles.real < _DAMPED * np.abs(poles)
     return bool((poles.imag[swings] >= np.pi * scene.clock.control_rate).any())

@@ -152,6 +152,10 @@ class Chain:
             rates[-1, size - 1] -= rate
         return rates
 
+    def poles(self) -> np.ndarray:
+        """Returns the eigenvalues s of free motions e^(s t), 1/s, complex, shape (states,)."""
+        return np.linalg.eigvals(self.rates()[:, : len(self.states)].astype(float))
+
     def real_for(self, step_s: float) -> type[np.floating]:
         """Returns the float type in which to sum forms of rates; see ``transition.real_for``."""
         n = self.count

@@ -158,7 +158,8 @@ def judge(directory: Directory, json: Json = False) -> None:
                 scene, kinds, events = repeatable(directory, recorded)
                 demand_own(recorded, scene)
                 finding = judge_scene(scene, kinds, events, thorough=True, causes=True)
-                found = entries_of(finding, scene, scene.duration - WINDOW_S)["stability"]
+                last_s = float(recorded["/controller"]["timestamp"][-1])
+                found = entries_of(finding, scene, last_s - min(WINDOW_S, last_s / 2.0))["stability"]
         except ReplayError as error:
             leave(str(error), WRONG_USE)
     if json:

@@ -53,7 +53,7 @@ _PRESSED_THROUGH = (
     "the hand, which presses harder than the wall answers within the device's limit, or than the actuator can."
 )
 _SMALL_SHARE = "of the {:.0%} of the oscillation that the loop sustains alone, "
-_TRIED = "{cause}. Started anew on the wall, pushed and struck, the loop {trials}."
+_TRIED = "{cause}. Started anew on the wall, pushed, and struck where it rests, the loop {trials}."
 _BY_BOOKS = "According to the books of the whole run"
 # The books of wall and elements are those of the commands, and the actuator has one of its own.
 _LIMITED = " That counts what was commanded: the actuator's limits kept {kept} of it back."

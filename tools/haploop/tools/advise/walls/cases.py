@@ -6,8 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from haploop.plant.chain.chain import Chain
 from haploop.protocol.scene.hand_force import Constant, Sine, constant_from_s
 from haploop.protocol.scene.paths import value_at, with_value
@@ -110,9 +108,7 @@ def is_ideal(loop: Scene) -> bool:
 
 def slowness(loop: Scene) -> float:
     """Returns how many times as long as usual everything takes if the delay is long or the hand swings slowly."""
-    chain = Chain.from_scene(loop)
-    poles = np.linalg.eigvals(chain.rates()[:, : len(chain.states)].astype(float))
-    swinging = [abs(pole) for pole in poles if pole.imag and -pole.real < _DAMPED * abs(pole)]
+    swinging = [abs(pole) for pole in Chain.from_scene(loop).poles() if pole.imag and -pole.real < _DAMPED * abs(pole)]
     period_s = 2.0 * math.pi / min(swinging) if swinging else 0.0
     times = max(ROUND_TRIPS * loop.clock.round_trip_delay, min(_SLOWEST * LASTS_S, PERIODS * period_s)) / LASTS_S
     return max(1.0, math.ceil(10.0 * times) / 10.0)
