@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from haploop.plant.motion.transition import real_for
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
@@ -152,9 +153,9 @@ class Chain:
             rates[-1, size - 1] -= rate
         return rates
 
-    def poles(self) -> np.ndarray:
+    def poles(self) -> NDArray[np.complex128]:
         """Returns the eigenvalues s of free motions e^(s t), 1/s, complex, shape (states,)."""
-        return np.linalg.eigvals(self.rates()[:, : len(self.states)].astype(float))
+        return np.linalg.eigvals(self.rates()[:, : len(self.states)].astype(float)).astype(np.complex128)
 
     def real_for(self, step_s: float) -> type[np.floating]:
         """Returns the float type in which to sum forms of rates; see ``transition.real_for``."""
