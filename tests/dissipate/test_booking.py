@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from haploop.controller.dissipation import ElementError
 from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.reading.delimited import RecordingError
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.logger import read
 from haploop.tools.dissipate.booking import Booking
-from haploop.tools.dissipate.recording.samples import RecordingError
 from haploop.tools.dissipate.recording.text_recording import Layout
 from helpers.data.recordings import PERIOD_S, booking, outcome, samples, write
 from helpers.scenes.least import KINDS, scene

@@ -11,11 +11,11 @@ import pytest
 from typer.testing import CliRunner
 
 from haploop.launch.runs.in_process import run_in_process
+from haploop.launch.scene.reading.delimited import RecordingError
 from haploop.launch.scene.toml_writer import to_toml
 from haploop.tools.cli.app import app
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.outcome import ForceOutcome
-from haploop.tools.dissipate.recording.samples import RecordingError
 from haploop.tools.dissipate.recording.text_recording import Layout
 from haploop.tools.dissipate.report import conclusion, make_report, note_sentences
 from helpers.data.recordings import outcome, write

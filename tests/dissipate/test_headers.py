@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from haploop.tools.dissipate.recording.delimited import DelimitedFile
-from haploop.tools.dissipate.recording.samples import RecordingError
+from haploop.launch.scene.reading.delimited import DelimitedFile, RecordingError
 from haploop.tools.dissipate.recording.text_recording import Layout
 from helpers.data.recordings import T, X, outcome, true_J
 

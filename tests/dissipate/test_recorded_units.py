@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from haploop.launch.scene.reading.delimited import RecordingError
 from haploop.launch.scene.units import name_and_unit
-from haploop.tools.dissipate.recording.samples import RecordingError
 from haploop.tools.dissipate.recording.text_recording import Layout
 from haploop.tools.dissipate.report import make_report, note_sentences
 from helpers.data.recordings import T, X, outcome, true_J, write

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from haploop.controller.dissipation import ElementError
-from haploop.tools.dissipate.recording.samples import RecordingError
+from haploop.launch.scene.reading.delimited import RecordingError
 from haploop.tools.dissipate.recording.text_recording import Layout, TextRecording
 from haploop.tools.dissipate.report import note_sentences
 from helpers.data.recordings import T, X, outcome, true_J, write

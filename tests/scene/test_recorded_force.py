@@ -20,18 +20,33 @@ def test_a_recorded_force_is_read_in_whole_relative_to_the_file_that_names_it(fi
     ("csv", "sentence"),
     [
         ("t,f\n0,1\n0,2\n", "Line 3: The times must increase, but 0 s follows 0 s."),
-        ("0,1\n1,x\n", "Line 2 must be a time in s and a force in N, but is '1,x'."),
-        ("0,1\n1\n", "Line 2 must be a time in s and a force in N, but is '1'."),
-        ("0,1,2\n", "Line 1 must be a time in s and a force in N, but is '0,1,2'."),
+        ("0,1\n1,x\n", "Line 2 of {path}: a number was expected in column 2, not 'x'."),
+        ("0,1\n1\n", "Line 2: Time and force must be finite numbers."),
+        (
+            "t,f\n0,1\n1,2,3\n",
+            "Line 3 of {path} has 3 cells, but 2 columns were expected. Decimal commas need semicolons, tabs or blanks "
+            "between the cells.",
+        ),
+        (
+            "0,1,2\n",
+            "Which column of {path} is the time? Name it with time_column, by name or number. There are: 1, 2, 3.",
+        ),
+        (
+            "t (s);Kraft;Weg\n0;1;2\n",
+            "Which column of {path} is the force? Name it with force_column, by name or number. There are: t, Kraft, Weg.",
+        ),
+        ("t\n0\n", "Which column of {path} is the force? Name it with force_column, by name or number. There are: t."),
+        ("", "{path} is empty: a line for every sample was expected."),
         ("0,nan\n", "Line 1: Time and force must be finite numbers."),
         ("t,f\n", "There must be at least one sample."),
-        (None, "The recording cannot be read: No such file or directory."),
+        (None, "The recording {path} cannot be read: No such file or directory."),
     ],
 )
 def test_a_recording_that_cannot_be_used_says_which_line(files, tmp_path, csv, sentence):
     if csv is not None:
         (tmp_path / "push.csv").write_text(csv)
     path = files(top=LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\n')
+    sentence = sentence.format(path=tmp_path / "push.csv")
     assert file_mistakes(path) == [f'top.toml:7: hand.force.file is "push.csv". {sentence}']
 
 
@@ -56,5 +71,29 @@ def test_units_in_the_header_of_a_recorded_force_are_read(files, tmp_path, csv, 
     wrong = csv.replace("F [mN]", "m (g)").replace("F_mN", "m (g)").replace("force (N)", "m (kg)")
     (tmp_path / "push.csv").write_text(wrong)
     [mistake] = file_mistakes(path)
-    assert "Line 1, the header of time and force:" in mistake
     assert "is a mass; a force was expected" in mistake
+
+
+@pytest.mark.parametrize(
+    ("text", "keys"),
+    [
+        ("Zeit (s);Kraft (N)\n0,0;0,5\n0,5;-1,25\n", ""),
+        ("Zeit (ms)\tWeg (mm)\tKraft (N)\n0\t7\t0.5\n500\t8\t-1.25\n", ""),
+        ("F,x,t\n0.5,7,0\n-1.25,8,0.5\n", ""),
+        ("0 7 0.5\n0.5 8 -1.25\n", 'time_column = 1\nforce_column = "3"\n'),
+        ("t,F,held (N)\n0,7,0.5\n0.5,8,-1.25\n", 'force_column = "held"\n'),
+    ],
+)
+def test_a_recorded_force_is_found_among_other_columns_however_they_are_separated(files, tmp_path, text, keys):
+    (tmp_path / "push.csv").write_text(text)
+    path = files(top=LEAST_TOML + f'[hand.force]\nkind = "trace"\nfile = "push.csv"\n{keys}')
+    assert load(path).hand == Hand(force=Trace(time=(0.0, 0.5), force=(0.5, -1.25)))
+
+
+def test_a_column_of_a_recorded_force_is_a_name_or_a_number(files, tmp_path):
+    (tmp_path / "push.csv").write_text("t,F\n0,1\n")
+    top = LEAST_TOML + '[hand.force]\nkind = "trace"\nfile = "push.csv"\n'
+    [mistake] = file_mistakes(files(top=top + "force_column = true\n"))
+    assert mistake.endswith("hand.force.force_column is true. It must be the name of a column, or its number from 1.")
+    [mistake] = file_mistakes(files(top=top + 'force_column = "G"\n'))
+    assert "There is no column 'G' in" in mistake

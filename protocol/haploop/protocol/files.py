@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import errno
+import math
 import os
 import stat
 from pathlib import Path
 
 # No text file that a person or a run of this program has written is larger than this.
-_MOST_BYTES = 1 << 26
+MOST_BYTES = 1 << 26
 
 
-def demand_regular(path: str | Path) -> os.stat_result:
+def demand_regular(path: str | Path, most_bytes: float = math.inf) -> os.stat_result:
     """Returns size and times of a file that can be read to its end.
 
     Raises:
-        OSError: there is no such file, or it is a directory, a pipe or a device; ``strerror`` says so in words.
+        OSError: there is no such file, it is a directory, a pipe or a device, or longer than ``most_bytes``;
+            ``strerror`` says so in words.
     """
     try:
         found = Path(path).stat()
@@ -25,14 +27,14 @@ def demand_regular(path: str | Path) -> os.stat_result:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if not stat.S_ISREG(found.st_mode):
         raise OSError(errno.EINVAL, "It is a pipe or a device, not a file", str(path))
+    if found.st_size > most_bytes:
+        raise OSError(errno.EFBIG, f"It has {found.st_size} bytes, but at most {most_bytes} were expected", str(path))
     return found
 
 
-def read_file(path: str | Path, most_bytes: int = _MOST_BYTES) -> bytes:
-    """Returns a file's content; raises OSError as ``demand_regular`` does, or if it is longer than ``most_bytes``."""
-    size = demand_regular(path).st_size
-    if size > most_bytes:
-        raise OSError(errno.EFBIG, f"It has {size} bytes, but at most {most_bytes} were expected", str(path))
+def read_file(path: str | Path, most_bytes: int = MOST_BYTES) -> bytes:
+    """Returns a file's content; raises OSError as ``demand_regular`` does."""
+    demand_regular(path, most_bytes)
     return Path(path).read_bytes()
 
 

@@ -59,8 +59,12 @@ def whole_schema(kinds: Mapping[str, type[Element]]) -> Schema:
 @cached_until_brought
 def _whole_schema(kinds: tuple[tuple[str, type[Element]], ...]) -> Schema:
     schema = scene_model(dict(kinds)).model_json_schema(schema_generator=TomlSchema)
-    about = "a CSV of time and force, in s and N or in the units of its header's brackets, in place of time and force"
-    schema["$defs"]["Trace"]["properties"]["file"] = {"type": "string", "description": about}
+    about = "a text file of time and force, in s and N or in the units of its header, in place of time and force"
+    trace = schema["$defs"]["Trace"]["properties"]
+    trace["file"] = {"type": "string", "description": about}
+    for name in ("time", "force"):
+        about = f"the column of the file that holds the {name}, by its name or its number from 1"
+        trace[f"{name}_column"] = {"type": ["string", "integer"], "description": about}
     counted = model_of(CountedRange).model_json_schema(schema_generator=TomlSchema)
     schema["$defs"]["Encoder"]["properties"] |= counted["properties"]
     return schema

@@ -135,6 +135,12 @@ def is_unit(text: str) -> bool:
     return bool(text.strip()) and _exact(text.strip()) is not None
 
 
+def has_dimension(text: str, target: str) -> bool:
+    """Tells whether a text is a unit that most texts use, of the dimension of the unit ``target``."""
+    given, wanted = _exact(text.strip()), _exact(target)
+    return bool(text.strip()) and given is not None and wanted is not None and given[0] == wanted[0]
+
+
 def is_exotic(text: str) -> bool:
     """Tells whether a text is a number with a unit that only pint may know."""
     match = _TEXT.fullmatch(text)

@@ -13,6 +13,7 @@ from typing import Any
 from haploop.controller.dissipation import Element
 from haploop.launch.runs.run_files import holds_readings
 from haploop.launch.scene.file import resolved
+from haploop.launch.scene.reading.delimited import RecordingError
 from haploop.launch.scene.reading.layers import Layers, key_path
 from haploop.protocol.scene.scene import Clock, Device, Scene, accelerometer_is_used
 from haploop.tools.command.given import kinds_with
@@ -21,7 +22,7 @@ from haploop.tools.dissipate.booking import Booking
 from haploop.tools.dissipate.figure import make_figure
 from haploop.tools.dissipate.outcome import Outcome, Recording, make_outcome, make_tried
 from haploop.tools.dissipate.recording.position_noise import PositionNoise
-from haploop.tools.dissipate.recording.samples import LogRecording, RecordingError, read_scene
+from haploop.tools.dissipate.recording.samples import LogRecording, read_scene
 from haploop.tools.dissipate.recording.text_recording import Layout, TextRecording
 from haploop.tools.dissipate.report import make_report
 from haploop.tools.dissipate.swing.finder import BuzzFinder

@@ -10,7 +10,6 @@ from pydantic_core import PydanticCustomError
 from haploop.launch.scene.mistakes import COMMAND_LINE
 from haploop.launch.scene.models import number_of
 from haploop.launch.scene.reading.layers import Layers
-from haploop.launch.scene.reading.trace import TraceError, read_trace
 from haploop.protocol.quantity import si
 from haploop.protocol.scene.table import Table
 
@@ -66,18 +65,26 @@ def _read_recording(layers: Layers) -> None:
     force = hand.get("force") if isinstance(hand, dict) else None
     if not isinstance(force, dict) or force.get("kind") != "trace" or "file" not in force:
         return
-    key = ("hand", "force", "file")
-    times, forces = [0.0], [0.0]
+    from haploop.launch.scene.reading.trace import RecordingError, read_trace  # numpy, only where a file is read
+
+    path = ("hand", "force")
+    key, times, forces = (*path, "file"), [0.0], [0.0]
+    columns = {name: force[f"{name}_column"] for name in ("time", "force") if f"{name}_column" in force}
     if "time" in force or "force" in force:
         layers.complain(key, "A trace has either a file or the lists time and force.")
     elif not isinstance(force["file"], str):
-        layers.complain(key, "It must be the path of a CSV file of time and force.")
+        layers.complain(key, "It must be the path of a text file of time and force, such as a CSV.")
+    elif wrong := [
+        name for name, value in columns.items() if isinstance(value, bool) or not isinstance(value, str | int)
+    ]:
+        layers.complain((*path, f"{wrong[0]}_column"), "It must be the name of a column, or its number from 1.")
     else:
         origin = layers.origin(key)
         folder = Path() if origin == COMMAND_LINE else Path(origin).parent
         try:
-            times, forces = read_trace(folder / force["file"])
-        except TraceError as error:
+            times, forces = read_trace(folder / force["file"], **{name: str(value) for name, value in columns.items()})
+        except RecordingError as error:
             layers.complain(key, str(error))
-    del force["file"]
+    for name in ("file", *(f"{name}_column" for name in columns)):
+        del force[name]
     force |= {"time": times, "force": forces}

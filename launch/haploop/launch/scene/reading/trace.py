@@ -1,60 +1,70 @@
-"""A recorded hand force: times and forces of a CSV file."""
+"""A recorded hand force: times and forces of a text file."""
 
 from __future__ import annotations
 
-import csv
+from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from haploop.launch.scene.models import fault
-from haploop.launch.scene.units import is_number, name_and_unit, scale_of
-from haploop.protocol.files import line_of, read_text
+from haploop.launch.scene.reading.delimited import Column, DelimitedFile, RecordingError
+from haploop.launch.scene.units import has_dimension, scale_of
+from haploop.protocol.files import MOST_BYTES, demand_regular
+
+# Names by which a column is known.
+_TIMES = ("t", "time", "timestamp", "seconds")
+_FORCES = ("f", "force")
+_WHICH = "Which column of {path} is the {what}? Name it with {what}_column, by name or number. There are: {names}."
 
 
-class TraceError(ValueError):
-    """A recording that cannot be used; the message is a full sentence."""
+def read_trace(path: Path, time: str | None = None, force: str | None = None) -> tuple[list[float], list[float]]:
+    """Returns times in s and forces in N of a text file of numbers, as ``DelimitedFile`` reads it.
 
+    Units are those of the header, ``t (ms), force [mN]``; s and N where it has none. A column is found by its name,
+    else by its unit, else in a file of two columns by its place.
 
-def read_trace(path: Path) -> tuple[list[float], list[float]]:
-    """Returns times in s and forces in N of a two-column CSV, which may have a header line and empty lines.
-
-    Brackets in the header give units, ``t (ms), force [mN]``.
+    Args:
+        time, force: names of the columns, or their numbers from 1; None for the ones that are found.
 
     Raises:
-        TraceError: no such file, not text, no such unit, or a line that is not a pair of numbers, with its number.
+        RecordingError: no such file, not text, no such column or unit, or a line without two finite numbers.
     """
     try:
-        rows = list(csv.reader(read_text(path).splitlines()))
-    except UnicodeDecodeError as error:
-        line = line_of(error)
-        raise TraceError(f"The recording must be UTF-8 text, but line {line} is not; save it as UTF-8.") from error
+        demand_regular(path, MOST_BYTES)
     except OSError as error:
-        raise TraceError(f"The recording cannot be read: {error.strerror}.") from error
-    except csv.Error as error:
-        raise TraceError("The recording must be lines of two numbers, but a cell is longer than any number.") from error
-    numbers, times, forces = [], [], []
-    scales = [1.0, 1.0]
-    for number, cells in enumerate(rows, start=1):
-        if not any(cell.strip() for cell in cells):
-            continue
-        try:
-            time, force = map(float, cells)
-        except ValueError as error:
-            if not times and len(cells) == 2 and not any(map(is_number, cells)):
-                scales = _units(number, cells)
-                continue
-            line = ",".join(cells)
-            raise TraceError(f"Line {number} must be a time in s and a force in N, but is {line!r}.") from error
-        numbers.append(number)
-        times.append(time * scales[0])
-        forces.append(force * scales[1])
-    if found := fault(times, forces):
-        raise TraceError(f"Line {numbers[found[0]]}: {found[1]}" if numbers else found[1])
-    return times, forces
+        raise RecordingError(f"The recording {path} cannot be read: {error.strerror}.") from error
+    file = DelimitedFile(path)
+    columns = [_column(file, time, "time", _TIMES, "s"), _column(file, force, "force", _FORCES, "N")]
+    if columns[0] == columns[1]:
+        raise RecordingError(_WHICH.format(path=path, what="force", names=_names(file)))
+    scales = [_scale(file, column, unit) for column, unit in zip(columns, ("s", "N"), strict=True)]
+    blocks = [*file.blocks(columns)]
+    times, forces = np.concatenate([table for table, _ in blocks] or [np.empty((0, 2))]).T * np.array(scales)[:, None]
+    if found := fault(times.tolist(), forces.tolist()):
+        lines = [line for _, numbers in blocks for line in numbers.tolist()]
+        raise RecordingError(f"Line {lines[found[0]]:.0f}: {found[1]}" if lines else found[1])
+    return times.tolist(), forces.tolist()
 
 
-def _units(line: int, header: list[str]) -> list[float]:
-    """Returns the factors that convert times and forces to s and N, by the units of a header."""
+def _column(file: DelimitedFile, given: str | None, what: str, names: Sequence[str], unit: str) -> Column:
+    if given is not None:
+        return file.column(given, what)
+    in_unit = [column for column in file.columns if has_dimension(column.unit, unit)]
+    place = 0 if what == "time" else 1
+    if found := file.find(names) or (in_unit[0] if len(in_unit) == 1 else None):
+        return found
+    if len(file.columns) == 2:
+        return file.columns[place]
+    raise RecordingError(_WHICH.format(path=file.path, what=what, names=_names(file)))
+
+
+def _names(file: DelimitedFile) -> str:
+    return ", ".join(column.name for column in file.columns)
+
+
+def _scale(file: DelimitedFile, column: Column, unit: str) -> float:
     try:
-        return [scale_of(name_and_unit(head)[1], unit) for head, unit in zip(header, ("s", "N"), strict=True)]
+        return scale_of(column.unit, unit)
     except ValueError as error:
-        raise TraceError(f"Line {line}, the header of time and force: {error}") from error
+        raise RecordingError(f"Column {column.name} of {file.path}: {error}") from error

@@ -7,22 +7,17 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from haploop.launch.runs.run_files import holds_readings, recorded_scene
+from haploop.launch.scene.reading.delimited import Floats, RecordingError
 from haploop.logger.log.recording import Table
 from haploop.logger.log.stream import Batch, LogStream
 from haploop.protocol.scene.effects import Actuator
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import DELAY, Timebase, TimebaseError
 
-Floats = NDArray[np.float64]
 # Share of uneven periods above which they are reported before anything else.
 UNEVEN_SHARE = 0.01
-
-
-class RecordingError(ValueError):
-    """Raised for a recording that cannot be used; the message says why and what to do."""
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from haploop.launch.scene.reading.delimited import Column, DelimitedFile, Floats, RecordingError
 from haploop.launch.scene.units import scale_of
-from haploop.tools.dissipate.recording.delimited import Column, DelimitedFile
 from haploop.tools.dissipate.recording.plausible import Largest
 from haploop.tools.dissipate.recording.repeats import repeats
-from haploop.tools.dissipate.recording.samples import Floats, Notes, RecordingError, Samples
+from haploop.tools.dissipate.recording.samples import Notes, Samples
 from haploop.tools.dissipate.recording.stamps import ONE_MISSING, Flags, Stamps, is_late, stamps
 
 # Times without a unit are seconds under this name; under others only if they are not far apart.
@@ -122,7 +122,7 @@ class TextRecording:
                 option = "--unit" if what == "position" else f"--{what}-unit"
                 amount = "11 um" if what == "position" else f"0.1 {si}"
                 raise RecordingError(
-                    f'{error} Give {option}: a unit, or {si} per count, as a number or text such as "{amount}".'
+                    f'Column {column.name} of {file.path}: {error} Give {option}: a unit, or {si} per count, as a number or text such as "{amount}".'
                 ) from error
         return columns, scales
 

@@ -15,17 +15,23 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from haploop.launch.scene.units import is_number, is_unit, name_and_unit
 from haploop.protocol.files import demand_regular
 from haploop.protocol.names import nearest
-from haploop.tools.dissipate.recording.samples import Floats, RecordingError
+
+Floats = NDArray[np.float64]
 
 _BLOCK_ROWS = 16_384
 # First bytes of a text in that code.
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 # What a cell without a value may hold.
 _MISSING = ("", "-", "--", "na", "n/a", "none", "null")
+
+
+class RecordingError(ValueError):
+    """Raised for a recording that cannot be used; the message says why and what to do."""
 
 
 @dataclass(frozen=True)
