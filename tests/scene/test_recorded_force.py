@@ -32,8 +32,8 @@ def test_a_recorded_force_is_read_in_whole_relative_to_the_file_that_names_it(fi
             "Which column of {path} is the time? Name it with time_column, by name or number. There are: 1, 2, 3.",
         ),
         (
-            "t (s);Kraft;Weg\n0;1;2\n",
-            "Which column of {path} is the force? Name it with force_column, by name or number. There are: t, Kraft, Weg.",
+            "t (s);a;b\n0;1;2\n",
+            "Which column of {path} is the force? Name it with force_column, by name or number. There are: t, a, b.",
         ),
         ("t\n0\n", "Which column of {path} is the force? Name it with force_column, by name or number. There are: t."),
         ("", "{path} is empty: a line for every sample was expected."),

@@ -19,9 +19,10 @@ from haploop.tools.draw import draw_any
 from haploop.tools.figure.data import FigureError, RunData
 from haploop.tools.figure.run_figure import draw, event_lines, key_numbers, make_figure
 from haploop.tools.figure.scene_units import element_units
+from haploop.tools.render.report import summary_table
 from helpers.runs.drawn import made
 from helpers.scenes.least import WALL, scene
-from helpers.shown import artists, axes
+from helpers.shown import artists, axes, shown
 
 PNG = b"\x89PNG"
 
@@ -87,7 +88,12 @@ def test_the_header_tells_verdict_and_numbers(runs: dict[str, Path]) -> None:
     assert [text.get_text() for text in artists(figure, "verdict")] == [data.summary["verdict"]]
     assert [text.get_text() for text in artists(figure, "title")] == [data.scene.title]
     assert any("residual" in words for words in key_numbers(data))
-    assert any(words.startswith("displayed stiffness") for words in key_numbers(data))
+    assert data.summary["verdict"] == "limit-cycle"
+    assert not any("displayed stiffness" in words for words in key_numbers(data))
+    assert "displayed stiffness" not in shown(summary_table(data.summary))
+    rests = data.summary | {"verdict": "steady"}
+    assert any(words.startswith("displayed stiffness") for words in key_numbers(replace(data, summary=rests)))
+    assert "displayed stiffness" in shown(summary_table(rests))
     swing = {"rate_1_s": 0.0, "width_m": 5.2e-3, "spread_m": 1e-4, "frequency_Hz": 7.5, "felt": True, "chaotic": False}
     data.summary["stability"] = swing
     assert "held still and pushed, it swings 5.20 mm +- 100 µm peak to peak, at 7.50 Hz, felt" in key_numbers(data)

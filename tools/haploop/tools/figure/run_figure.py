@@ -13,7 +13,15 @@ from haploop.tools.figure.event_words import event_words
 from haploop.tools.figure.loops import draw_force_position, draw_momentum
 from haploop.tools.figure.own_columns import draw_own_columns, own_columns
 from haploop.tools.figure.time import energy_panel, force_panel, mark_events, position_panel
-from haploop.tools.render.report import HELD, count_losses, leak_rows, noted, plant_books, swing_words
+from haploop.tools.render.report import (
+    HELD,
+    count_losses,
+    displayed_stiffness,
+    leak_rows,
+    noted,
+    plant_books,
+    swing_words,
+)
 from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount, parameters, spring
 
@@ -131,7 +139,7 @@ def key_numbers(run: RunData) -> list[str]:
     wall = run.wall_table_at(float(run.ticks_s[-1]))
     if wall and run.summary["verdict"] != "no-contact":
         words.append(f"outside the wall {100 * window['outside_fraction']:.0f} %")
-        displayed = window["displayed_stiffness_N_m"]
+        displayed = displayed_stiffness(run.summary)
         wanted = f" of {spring(wall.stiffness)}" if wall.kind in (None, "spring") else ""
         words += [f"displayed stiffness {spring(displayed)}{wanted}"] if displayed is not None else []
     left = f"residual {amount(energy['residual_J'], 'J')} of " if "unmodelled_work_J" not in energy else ""

@@ -53,6 +53,11 @@ def plant_books(energy: Summary) -> dict[str, str]:
     return {key: name for key, name in words.items() if key in energy}
 
 
+def displayed_stiffness(summary: Summary) -> float | None:
+    """Returns the displayed stiffness, N/m; None where the loop swings, whose mean force over depth is no stiffness."""
+    return None if summary["verdict"] in SWINGS else summary["window"]["displayed_stiffness_N_m"]
+
+
 def count_losses(summary: Summary) -> dict[str, int]:
     """Returns what was lost or limited, and how often; what never happened is left out."""
     found = {words: summary.get(entry, {}).get(key, 0) for entry, key, words in _COUNTS}
@@ -131,9 +136,9 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
         figures.append(
             ("penetration measured", depth + (f", outside the wall {outside:.0f} % of the time" if outside else ""))
         )
-    if window["displayed_stiffness_N_m"] is not None:
+    if (displayed := displayed_stiffness(summary)) is not None:
         beyond = " at the motor; the cable gives way, too" if "cable_heat_J" in summary["energy"] else ""
-        figures.append(("displayed stiffness", spring(window["displayed_stiffness_N_m"]) + beyond))
+        figures.append(("displayed stiffness", spring(displayed) + beyond))
     if happened := count_losses(summary):
         figures.append(("in all", ", ".join(f"{count} {words}" for words, count in happened.items())))
     return figures

@@ -74,9 +74,7 @@ def _read_recording(layers: Layers) -> None:
         layers.complain(key, "A trace has either a file or the lists time and force.")
     elif not isinstance(force["file"], str):
         layers.complain(key, "It must be the path of a text file of time and force, such as a CSV.")
-    elif wrong := [
-        name for name, value in columns.items() if isinstance(value, bool) or not isinstance(value, str | int)
-    ]:
+    elif wrong := [name for name, value in columns.items() if type(value) not in (str, int)]:
         layers.complain((*path, f"{wrong[0]}_column"), "It must be the name of a column, or its number from 1.")
     else:
         origin = layers.origin(key)

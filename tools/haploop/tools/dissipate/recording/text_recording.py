@@ -122,7 +122,8 @@ class TextRecording:
                 option = "--unit" if what == "position" else f"--{what}-unit"
                 amount = "11 um" if what == "position" else f"0.1 {si}"
                 raise RecordingError(
-                    f'Column {column.name} of {file.path}: {error} Give {option}: a unit, or {si} per count, as a number or text such as "{amount}".'
+                    f"Column {column.name} of {file.path}: {error} "
+                    f'Give {option}: a unit, or {si} per count, as a number or text such as "{amount}".'
                 ) from error
         return columns, scales
 
