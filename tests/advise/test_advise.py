@@ -112,7 +112,7 @@ def test_an_advice_says_first_that_it_is_an_upper_bound_goes_on_when_stopped_and
     assert repr(told).startswith("<Advice on premium15: at most ")
     assert len(repr(told)) < 120
     assert str(told).startswith("Upper bound, not advice")
-    assert "advice_breaks.toml: the case that breaks first, at " in done.stderr
+    assert "advice_breaks.toml: the case that breaks first, with a wall of " in done.stderr
     assert "the wall alone (1 of 7) ..." in done.stderr
     advised = load(out / "advice.toml")
     assert value_at(advised, "wall.stiffness") == found["recommended"]["stiffness_N_m"]

@@ -10,6 +10,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from haploop.protocol.scene.paths import value_at, with_value
@@ -23,10 +24,12 @@ from haploop.tools.advise.families import DAMPING, NOTHING, Family, Values
 from haploop.tools.advise.report import _changes as changes_table
 from haploop.tools.advise.report import answer, describe, describe_run, format_limit
 from haploop.tools.advise.search import STAGES, Found
+from haploop.tools.advise.walls.felt import felt_force_N
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.walls.store import Failure, Job, Store
 from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.advise.withstand import Best
+from haploop.tools.render.units import fixed
 from helpers.data.advices import ADVICE
 from helpers.scenes.least import scene
 from helpers.scenes.presets import loop_of
@@ -122,21 +125,28 @@ def test_what_gains_without_the_element_alone_is_told_as_that_and_no_change_is_s
 def test_what_the_verdict_says_beside_its_word_has_a_line_of_its_own() -> None:
     told = told_with(changed(1.0, 1.0))
     assert told["safe up to"].endswith("swinging by less than a hand feels")
-    assert told["its run"].endswith("beside its verdict: only friction holds it")
-    both = describe_run(("only friction holds it", "at some holds of its hand", "its force ripples"))
-    assert "only friction holds it, its force ripples; that run is pushed at only some holds" in both
-    assert both.endswith("the safe wall was tried at all of them")
+    assert told["its run"].endswith("adds to its verdict on advice.toml: only friction holds it")
+    both = describe_run(("only friction holds it", "tried at only some holds of its hand", "its force ripples"))
+    assert "only friction holds it, its force ripples; it pushes the loop at only some holds" in both
+    assert both.endswith("this wall was tried at all of them")
 
 
-def test_by_how_much_the_force_jumps_where_a_count_is_crossed_is_told_of_damping_and_inertia_together() -> None:
-    """B q / T + m q / T²: 20 N s/m and 7.5 g behind 20 um at 1 kHz jump by 0.4 N and 0.15 N."""
+def test_by_how_much_the_force_jumps_at_a_count_is_told_with_how_much_of_it_a_hand_would_feel() -> None:
+    """B q / T + m q / T²: 20 N s/m and 7.5 g behind 20 um at 1 kHz jump by 0.4 N and 0.15 N, and back by the latter."""
     elements = tuple(
         ElementTable(name=kind, acts="in-contact", parameters=parameters)
         for kind, parameters in (("damping", {"damping": 20.0}), ("bidirectional-inertia", {"mass": 7.5e-3}))
     )
     of = replace(scene(**pressed(encoder={"resolution": 2e-5})), dissipation=elements)
     told = dict(answer(replace(ADVICE, scene=of)))
-    assert "jumps by up to 550 mN" in told["at a count"]
+    line = told["at a count"]
+    assert "changes by 10.0 mN and the element's force jumps by up to 550 mN and back" in line
+    felt_N = float(felt_force_N(of)(np.array([100.0]))[0])
+    assert line.endswith(f"at 100 Hz would be {fixed(0.56 / felt_N, 2)} times what a hand feels")
+    alone = dict(answer(replace(ADVICE, scene=replace(of, dissipation=()))))["at a count"]
+    assert alone.startswith(
+        "with each count of the encoder, the wall's force changes by 10.0 mN: in a slow press, grit"
+    )
     assert "at a count" not in dict(answer(replace(ADVICE, scene=replace(of, encoder=None))))
 
 
@@ -168,9 +178,9 @@ def test_the_line_of_the_scene_that_breaks_says_on_which_wall_that_is() -> None:
         told: Any = SimpleNamespace(breaks=scene, found=SimpleNamespace(breaks=broken))
         return breaks_words(told)
 
-    stiffer = ": the case that breaks first, at 0.67 N/mm: at 0.39 N/mm it is felt, though"
+    stiffer = ": the case that breaks first, with a wall of 0.67 N/mm, the softest tried whose run is said to swing; the swing"
     assert words(665.0, "pushed").startswith(stiffer)
-    assert words(390.0, "pushed") == ": the case that breaks first, at 0.39 N/mm"
+    assert words(390.0, "pushed") == ": the case that breaks first, with a wall of 0.39 N/mm"
     assert "to the end of the quarter second" in words(390.0, "window")
 
 

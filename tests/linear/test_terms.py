@@ -50,6 +50,23 @@ def test_one_count_is_q_and_its_differences_over_the_period(occupies):
     assert found.a_m_s2 == pytest.approx(Q / T**2, rel=1e-9)
     assert found.wall_N == pytest.approx(K * Q, rel=1e-9)
     assert found.elements_N == pytest.approx((0.7 * Q / T, 0.004 * Q / T**2), rel=1e-9)
+    # Way out: the wall's force falls, and unidirectional inertia pushes while the device brakes.
+    assert found.total_N >= K * Q + 0.7 * Q / T
+
+
+@pytest.mark.parametrize(
+    ("element", "total_N"),
+    [
+        (None, K * Q),
+        ({"kind": "damping", "damping": 0.7}, K * Q + 0.7 * Q / T),
+        ({"kind": "bidirectional-inertia", "mass": 0.004}, 2.0 * 0.004 * Q / T**2),
+    ],
+)
+def test_the_forces_about_one_count_are_a_step_of_the_wall_and_what_elements_add_peak_to_peak(element, total_N):
+    """A wall steps by K q; a damper adds b q / T for a tick; an inertia pushes by m q / T², then back by as much."""
+    found = one_count(scene(encoder=ENCODER, wall=WALL, dissipation=[element] if element else []), KINDS)
+    assert found
+    assert found.total_N == pytest.approx(total_N, rel=1e-9)
 
 
 def test_one_count_over_a_window_is_spread_over_it():

@@ -64,7 +64,7 @@ def test_the_settling_time_is_that_of_the_second_order_loop():
 
 @pytest.mark.parametrize(("force", "said"), [
     ({"kind": "constant", "value": -1.0}, []),
-    ({"kind": "sine", "amplitude": 0.4, "frequency": 5.0, "offset": -1.0}, ["at some holds of its hand"]),
+    ({"kind": "sine", "amplitude": 0.4, "frequency": 5.0, "offset": -1.0}, ["tried at only some holds of its hand"]),
 ])  # fmt: skip
 def test_the_word_for_a_hand_that_moves_is_one_of_some_holds(force, said):
     of = scene(**{**pressed(), "hand": {"force": force}})

@@ -184,7 +184,7 @@ class Finding:
             "only friction holds it": self.frictionless in ("swings on", "swings on a part of a count deeper"),
             "perhaps only friction holds it": self.frictionless == "undecided",
             "an element's memory still changes": self.memory_drifts,
-            "at some holds of its hand": HAND_MOVES in beside,
+            "tried at only some holds of its hand": HAND_MOVES in beside,
             "noise shakes it": NOISE in beside and (seen_m or 0.0) > _SHAKEN_M,
             "its swing dies slowly": self.why == "decays" and self.felt,
             "its force ripples": (ripple_N or 0.0) > min(_RIPPLES * self.push_N, _RIPPLES_N),

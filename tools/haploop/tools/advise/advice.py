@@ -38,7 +38,7 @@ HOLDS_MORE = (
     "was not tried in every corner; `haploop compare` shows what it holds."
 )
 FELL = (
-    "With {0}, walls of {1} withstand every corner at three holds; at more holds and under attack, one of {2} does not."
+    "With {0}, walls of {1} withstand every corner at three holds; at more holds and under attack, a wall of {2} fails."
 )
 NO_OTHER = (
     "None of these elements, tried with seven parameter values each, allows {0} in every corner, a tenth more "

@@ -29,6 +29,7 @@ from haploop.tools.render.terminal import console
 from haploop.tools.render.units import format_stiffness
 
 ADVICE, FIGURE, WALLS, _ASKED = "advice.json", "figure.png", "walls.jsonl", "asked.toml"
+_STIFFER = ", the softest tried whose run is said to swing; the swing is felt from {0} on"
 _SCENE, _BREAKS = "advice.toml", "advice_breaks.toml"
 
 
@@ -103,8 +104,7 @@ def breaks_words(found: Advice) -> str:
     if scene.run.verdict != "pushed":
         return ": the case that breaks first, to the end of the quarter second in which it is felt"
     shown, told = format_stiffness(scene.wall.stiffness), format_stiffness(broken[0])
-    at = f": the case that breaks first, at {shown}"
-    return at if shown == told else f"{at}: at {told} it is felt, though its run's verdict does not say that it swings"
+    return f": the case that breaks first, with a wall of {shown}" + (_STIFFER.format(told) if shown != told else "")
 
 
 def _write(found: Advice, out: Path) -> AdviceData:

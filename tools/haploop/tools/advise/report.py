@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from haploop.tools.advise.advice import READING, Advice, Changed
 from haploop.tools.advise.changes import CLOSE
+from haploop.tools.advise.walls.felt import felt_force_N
 from haploop.tools.advise.walls.limit import LEAST_N_M, Limit
 from haploop.tools.advise.walls.store import Failure
 from haploop.tools.advise.withstand import ROUGH, WORTH, Best
@@ -36,13 +38,17 @@ _GRIP = ", holding through a grip of {0} N s/m and {1} N/m"
 _NO_HAND = "none, only its force: a hand may make this wall buzz (--hand)"
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
 # What the run of the advised scene adds to "steady"; the search has tried the wall at every hold.
-_SOME_HOLDS = "at some holds of its hand"
-_ADDS = "haploop run says of advice.toml, beside its verdict: {0}"
-_PUSHED = "that run is pushed at only some holds of its hand; the safe wall was tried at all of them"
-_KICK = (
-    "as the encoder moves by one, the element's force jumps by up to {0} and back by as much, and the wall's force "
-    "by a step in addition: in a slow press, grit of about twice that peak to peak, which is not a swing"
+_SOME_HOLDS = "tried at only some holds of its hand"
+_ADDS = "haploop run adds to its verdict on advice.toml: {0}"
+_PUSHED = "it pushes the loop at only some holds of its hand; this wall was tried at all of them"
+_STEP = "with each count of the encoder, the wall's force changes by {0}"
+_KICK = " and the element's force jumps by up to {0} and back, in all by {1} peak to peak"
+_GRIT = (
+    ": in a slow press, grit, which is no swing; a vibration of that force at {0:.0f} Hz would be {1} times what a "
+    "hand feels"
 )
+# Where a hand feels a vibration best, about.
+_BEST_FELT_HZ = 100.0
 # Of what happens in one of n cases, N cases miss e^(-N/n): a twentieth for n = N / 3.
 _TRIED = "{0} cases; a buzz that comes in fewer than one of {1:.0f} such cases may have been missed"
 _ALONE = "{0} without one, searched and attacked in the same way"
@@ -77,8 +83,8 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     lines = [("at most" if told.is_ideal else "safe up to", safe if found.stiffness_N_m else _NO_WALL)]
     if found.stiffness_N_m and told.provisos:
         lines.append(("its run", describe_run(told.provisos)))
-    if kick_N := _kick_N(told):
-        lines.append(("at a count", _KICK.format(amount(kick_N, "N"))))
+    if at_a_count := describe_count(told):
+        lines.append(("at a count", at_a_count))
     lines.append(("for a hand", describe_hand(told)))
     if found.stiffness_N_m:
         lines.append(("tried in", _TRIED.format(found.cases, found.cases / 3.0)))
@@ -136,10 +142,16 @@ def sentences(told: Advice) -> list[str]:
     return [told.headline, *(f"{name}: {words.rstrip('.')}." for name, words in answer(told))]
 
 
-def _kick_N(told: Advice) -> float:
-    """Returns by how much the advised element's force jumps when a count is crossed from rest, N; 0 without either."""
-    of = one_count(told.scene, installed_kinds()) if told.scene and told.found.advised.values else None
-    return sum(of.elements_N) if of else 0.0
+def describe_count(told: Advice) -> str:
+    """Describes by how much the forces of the advised scene jump where a count is crossed; "" without an encoder."""
+    if not told.scene or not (of := one_count(told.scene, installed_kinds())):
+        return ""
+    kick_N = sum(of.elements_N)
+    times = of.total_N / float(felt_force_N(told.scene)(np.array([_BEST_FELT_HZ]))[0])
+    words = _STEP.format(amount(of.wall_N, "N")) + (
+        _KICK.format(amount(kick_N, "N"), amount(of.total_N, "N")) if kick_N else ""
+    )
+    return words + _GRIT.format(_BEST_FELT_HZ, fixed(times, 2))
 
 
 def describe_run(provisos: Sequence[str]) -> str:

@@ -101,6 +101,7 @@ class OneCount:
 
     Attributes:
         elements_N: by element, in the scene's order.
+        total_N: of all forces together, peak to peak over the ticks about the step.
     """
 
     x_m: float
@@ -108,6 +109,7 @@ class OneCount:
     a_m_s2: float
     wall_N: float
     elements_N: tuple[float, ...]
+    total_N: float
 
 
 def one_count(scene: Scene, kinds: Kinds) -> OneCount | None:
@@ -117,16 +119,20 @@ def one_count(scene: Scene, kinds: Kinds) -> OneCount | None:
     count_m, wall = scene.encoder.resolution, scene.wall
     inward = 1.0 if wall and wall.occupies == "above" else -1.0
     x_m = (wall.position if wall else 0.0) + inward * DEEP_COUNTS * count_m
-    most = np.zeros(4 + len(scene.dissipation))
+    most, most_N = np.zeros(4 + len(scene.dissipation)), 0.0
     for step_m in (count_m, -count_m):
         params = make_params(replace(scene, event=()), 1.0 / scene.clock.control_rate, dict(kinds))
         rest = (0.0,) * accelerometer_is_used(scene)
         state = initial_state(params, (x_m, *rest))
-        before = np.zeros(len(most))
+        before, total_N = np.zeros(len(most)), list[float]()
         for number in range(2 * _TICKS):
             state, row = tick(params, state, (x_m + step_m * (number >= _TICKS), *rest))
             if number < _TICKS:
-                before = np.array(row[:-2], float)
+                before, total_N = np.array(row[:-2], float), [float(row[-2])]
             else:
+                total_N.append(float(row[-2]))
                 most = np.maximum(most, np.abs(np.array(row[:-2], float) - before))
-    return OneCount(count_m, *(float(value) for value in most[1:4]), elements_N=tuple(map(float, most[4:])))
+        most_N = max(most_N, max(total_N) - min(total_N))
+    return OneCount(
+        count_m, *(float(value) for value in most[1:4]), elements_N=tuple(map(float, most[4:])), total_N=most_N
+    )
