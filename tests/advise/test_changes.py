@@ -132,7 +132,7 @@ def test_what_the_verdict_says_beside_its_word_has_a_line_of_its_own() -> None:
 
 
 def test_by_how_much_the_force_jumps_at_a_count_is_told_with_how_much_of_it_a_hand_would_feel() -> None:
-    """B q / T + m q / T²: 20 N s/m and 7.5 g behind 20 um at 1 kHz jump by 0.4 N and 0.15 N, and back by the latter."""
+    """B q / T + m q / T²: 0.4 N and 0.15 N for 20 N s/m and 7.5 g behind 20 um at 1 kHz; the inertia pushes back."""
     elements = tuple(
         ElementTable(name=kind, acts="in-contact", parameters=parameters)
         for kind, parameters in (("damping", {"damping": 20.0}), ("bidirectional-inertia", {"mass": 7.5e-3}))
@@ -142,7 +142,7 @@ def test_by_how_much_the_force_jumps_at_a_count_is_told_with_how_much_of_it_a_ha
     line = told["at a count"]
     assert "changes by 10.0 mN and the element's force jumps by up to 550 mN and back" in line
     felt_N = float(felt_force_N(of)(np.array([100.0]))[0])
-    assert line.endswith(f"at 100 Hz would be {fixed(0.56 / felt_N, 2)} times what a hand feels")
+    assert line.endswith(f"at 100 Hz would be {fixed((0.4 + 2.0 * 0.15) / felt_N, 2)} times what a hand feels")
     alone = dict(answer(replace(ADVICE, scene=replace(of, dissipation=()))))["at a count"]
     assert alone.startswith(
         "with each count of the encoder, the wall's force changes by 10.0 mN: in a slow press, grit"
@@ -178,7 +178,7 @@ def test_the_line_of_the_scene_that_breaks_says_on_which_wall_that_is() -> None:
         told: Any = SimpleNamespace(breaks=scene, found=SimpleNamespace(breaks=broken))
         return breaks_words(told)
 
-    stiffer = ": the case that breaks first, with a wall of 0.67 N/mm, the softest tried whose run is said to swing; the swing"
+    stiffer = ": the case that breaks first, with a wall of 0.67 N/mm, the softest tried whose run is said to swing"
     assert words(665.0, "pushed").startswith(stiffer)
     assert words(390.0, "pushed") == ": the case that breaks first, with a wall of 0.39 N/mm"
     assert "to the end of the quarter second" in words(390.0, "window")
