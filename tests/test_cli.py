@@ -98,6 +98,25 @@ def test_check_prints_the_resolved_scene_or_the_schema_and_starts_nothing():
     assert haploop("check").exit_code == 2
 
 
+def test_an_element_that_takes_the_name_of_an_installed_one_is_noted_where_it_is_listed_and_where_it_runs(tmp_path):
+    plugin = tmp_path / "brake.py"
+    plugin.write_text(BRAKE.replace('"brake"', '"damping"'), encoding="utf-8")
+    note = "The element damping comes from a plugin, in place of the installed one."
+    assert note in haploop("plugins", "--plugin", str(plugin)).stderr
+    changes = ("--set", "dissipation.0.kind=damping", "--set", "duration=0.1", "--plugin", str(plugin))
+    run = haploop("run", FIG6C, *changes, "--in-process", "--json", "--out", str(tmp_path / "o"))
+    assert note in run.stderr
+    assert json.loads(run.stdout)["notes"] == [note]
+
+
+def test_a_parameter_in_what_is_no_unit_is_refused_where_elements_are_listed_as_where_they_run(tmp_path):
+    plugin = tmp_path / "brake.py"
+    plugin.write_text(BRAKE.replace('"N"', '"N q/m"'), encoding="utf-8")
+    listing = haploop("plugins", "--plugin", str(plugin))
+    assert listing.exit_code == 2
+    assert "is declared in 'N q/m', which is not a unit" in listing.stderr
+
+
 def test_a_plugin_of_ten_lines_is_listed_checked_run_and_replayed(tmp_path):
     plugin = tmp_path / "brake.py"
     plugin.write_text(BRAKE, encoding="utf-8")

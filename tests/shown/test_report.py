@@ -188,6 +188,8 @@ def test_the_status_table_tells_of_every_node_its_tick_its_lag_whom_it_waits_for
     assert max(map(len, text.splitlines())) <= width
     going = shown(status_table({**data, "paused": False, "pace": "free", "status": {}}))
     assert "paused" not in going
+    settling = shown(status_table({**data, "status": {**STATUS, "verdict": "undecided"}}), width)
+    assert "settling, oscillation 1.23 mm" in settling
     assert "tick 1200 of 3000, as fast as it goes" in going
 
 

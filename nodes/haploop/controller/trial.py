@@ -16,6 +16,7 @@ import os
 import queue
 import sys
 import threading
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -73,18 +74,26 @@ def _limit_memory() -> None:
 
 def _load(request: Reply, kinds: dict[str, type[Element]]) -> Reply:
     kinds.update(load_source(request["source"], request["origin"]))
-    for named in all_brought().values():
-        for name, made in named.items():
-            for key, (quantity, _) in made.parameters().items():
-                _check_unit(quantity.unit, f"{request['origin']}: {key} of {name}")
-    declared = {kind: _declaration(element, request["origin"]) for kind, element in kinds.items()}
+    for named in ({element.__name__: element for element in kinds.values()}, *all_brought().values()):
+        check_units(named, request["origin"])
+    declared = {kind: _declaration(element) for kind, element in kinds.items()}
     return {"kinds": declared, "brings": bool(all_brought())}
 
 
-def _declaration(element: type[Element], origin: str) -> Reply:
+def check_units(named: Mapping[str, Any], origin: str) -> None:
+    """Checks the units in which the parameters of some classes, elements or walls, are declared.
+
+    Raises:
+        PluginError: one is not a unit.
+    """
+    for name, made in named.items():
+        for key, (quantity, _) in made.parameters().items():
+            _check_unit(quantity.unit, f"{origin}: {key} of {name}")
+
+
+def _declaration(element: type[Element]) -> Reply:
     parameters, defaults = {}, {}
     for name, (quantity, default) in element.parameters().items():
-        _check_unit(quantity.unit, f"{origin}: {name} of {element.__name__}")
         parameters[name] = dataclasses.asdict(quantity)
         if default is not dataclasses.MISSING:
             defaults[name] = default if quantity.choices else int(default) if quantity.whole else float(default)

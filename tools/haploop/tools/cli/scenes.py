@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from haploop.tools.command.given import kinds_with, print_note, print_notes
+from haploop.tools.command.given import kinds_with, notes_in_place, print_note, print_notes
 from haploop.tools.command.options import (
     FAILED,
     WRONG_USE,
@@ -89,12 +89,17 @@ def check(
 
 def plugins(plugin: Plugin = None, json: Json = False) -> None:
     """List elements, and what else a plugin adds, with parameters."""
+    from haploop.controller.trial import check_units
     from haploop.protocol.installed import all_brought
 
     with plain_errors():
         kinds: dict[str, Any] = dict(kinds_with(plugin or []))
-    for named in all_brought().values():
-        kinds |= named
+        noted = notes_in_place(kinds)
+        for named in all_brought().values():
+            kinds |= named
+        check_units(kinds, ", ".join(map(str, plugin or [])))
+    for note in noted:
+        print_note(note)
     if json:
         print_json({kind: _parameters(element) for kind, element in kinds.items()})
         return

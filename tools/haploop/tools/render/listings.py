@@ -33,8 +33,8 @@ def status_table(data: Message) -> RenderableType:
     head = Text.assemble((data.get("run", ""), "bold"), "  " if data.get("run") else "", data["title"])
     parts: list[RenderableType] = [head, Text.assemble(state, where)]
     if status := data.get("status"):
-        word = seen(status["verdict"])
-        looks = f" so far, oscillation {amount(status['oscillation_m'], 'm')} peak to peak"
+        word = "settling" if status["verdict"] == "undecided" else seen(status["verdict"])
+        looks = f"{' so far' * (word != 'settling')}, oscillation {amount(status['oscillation_m'], 'm')} peak to peak"
         parts.append(Text.assemble((word, verdict_style(word)), looks))
     parts += [Text(f"{words} {late}") for words, late in lateness_rows(data)]
     parts += [Text(reason, "yellow") for reason in data.get("refused", {}).values()]
