@@ -6,6 +6,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -163,6 +164,32 @@ def test_watching_a_live_loop_shows_what_its_log_will_hold_and_leaving_it_ends_i
     (tmp_path / "mine.txt").touch()
     with pytest.raises(RunFailed, match="must be new or empty"):
         start("fig6b", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("asked", "sentence"),
+    [
+        ({"axes": {"wall.stifness": [100.0]}}, "axes.wall.stifness is not a key of [wall]; did you mean stiffness?"),
+        ({"record": ["window.frequncy_Hz"]}, 'record.0 is "window.frequncy_Hz"; did you mean window.frequency_Hz?'),
+        ({"values": {"device.mass": -1.0}}, "values: device.mass is -1.0."),
+    ],
+)
+def test_a_mistake_in_an_argument_of_a_sweep_names_the_argument_and_no_file(
+    asked: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises(SceneError) as refused:
+        sweep("fig6c", **{"axes": {"wall.stiffness": [100.0]}, **asked}, workers=1)
+    assert str(refused.value).startswith(sentence)
+
+
+def test_a_sweep_records_what_is_asked_for_and_otherwise_the_width_and_frequency_of_what_lasts() -> None:
+    of, axes = load("fig6c", {"duration": 0.1}), {"wall.stiffness": [100.0]}
+    assert {"stability.width_m", "stability.frequency_Hz"} < set(sweep(of, axes, workers=1).columns)
+    asked = sweep(of, axes, record=["window.frequency_Hz"], workers=1)
+    assert "window.frequency_Hz" in asked.columns
+    assert "stability.width_m" not in asked.columns
+    with pytest.raises(TypeError, match="a sweep file names it itself"):
+        sweep("damping_stiffness", record=["window.frequency_Hz"])
 
 
 @pytest.mark.slow

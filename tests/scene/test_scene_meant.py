@@ -127,6 +127,17 @@ def test_a_pipe_or_a_device_is_no_scene_and_is_not_waited_for(tmp_path):
     assert "It must be the path of a scene file" in refused(tmp_path / "a.toml")
 
 
+def test_the_same_mistake_in_many_entries_of_a_list_is_told_once_and_in_a_few_each_time() -> None:
+    def told(forces: list[str]) -> list[str]:
+        trace = '{ kind = "trace", time = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5], force = [' + ", ".join(forces) + "] }"
+        return refused(FIG6C, f"hand.force={trace}").splitlines()
+
+    [mistake] = told(["0.0", *["nan"] * 5])
+    assert "hand.force.force.1 is nan. It must be a finite number of N. The same is wrong with 4 more" in mistake
+    assert len(told(["0.0", "0.0", "0.0", *["nan"] * 3])) == 3
+    assert len(told(["nan"] * 3 + ['"a"'] * 3)) == 6
+
+
 def test_of_thousands_of_mistakes_fifty_are_told(tmp_path):
     path = tmp_path / "many.toml"
     path.write_text(BASE + "\n".join(f"k{number} = 1" for number in range(1000)))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from haploop.controller.dissipation import registry
-from haploop.launch.runs.loaded_scene import LoadedScene, Values, load, plain, texts
+from haploop.launch.runs.loaded_scene import LoadedScene, Values, load, mistakes_of_python, plain, texts
 from haploop.launch.runs.result import Result
 from haploop.launch.scene.toml_writer import to_toml
 
@@ -30,6 +30,7 @@ def sweep(
     axes: Mapping[str, Any] | None = None,
     *,
     values: Values = (),
+    record: Sequence[str] = (),
     out: str | Path | None = None,
     workers: int | None = None,
     plugins: Plugins = (),
@@ -41,6 +42,7 @@ def sweep(
         axes: for each key of the scene, an array or list of values, or a table
             ``{"from": 100, "to": 2000, "count": 20}``.
         values: laid over the scene, as in ``load``.
+        record: with ``axes``, dotted keys of a run's summary, such as ``window.frequency_Hz``, in place of the usual.
         out: directory of the table; if it already holds this very sweep, that is continued. When None, nothing is kept.
         workers: number of processes; one per core when None.
         plugins: files with elements, walls, estimators or hand forces.
@@ -60,13 +62,17 @@ def sweep(
             files = files or list(scene.plugins)
             listed = {key: getattr(points, "tolist", lambda of=points: of)() for key, points in axes.items()}
             made = {"title": scene["title"], "base": scene.tables, "axes": plain(listed)}
+            made |= {"record": [*record]} if record else {}
             path = Path(scratch, "sweep.toml")
             path.write_text(to_toml(made), encoding="utf-8")
         elif isinstance(of, LoadedScene):
             raise TypeError('A scene is swept over axes, such as sweep(scene, {"wall.stiffness": [200, 400]}).')
+        elif record:
+            raise TypeError("What is recorded is given with axes; a sweep file names it itself.")
         directory = Path(out) if out is not None else Path(scratch, "sweep")
         request = Request(path, texts(values), directory, workers, plugins=files)
-        return read(carry_out(request)[0])
+        with mistakes_of_python(path if axes is not None else None):
+            return read(carry_out(request)[0])
 
 
 def advise(

@@ -14,7 +14,7 @@ from haploop.controller.tried import try_kinds
 from haploop.launch.scene import file as scene_file
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.events import elements_of, try_out
-from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError
+from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError, shown
 from haploop.launch.scene.reading.layers import Layers, lay_overrides
 from haploop.launch.scene.toml_writer import inline, to_toml
 from haploop.launch.scene.unmodelled import demand_modelled
@@ -108,7 +108,7 @@ class LoadedScene:
             raise TypeError(SET_SO)
         if at is None:
             layers = Layers(self.path, self.tables)
-            with _mistakes_of_values():
+            with mistakes_of_python():
                 lay_overrides(layers, texts(values))
                 return self._resolved(layers)
         if not isinstance(values, Mapping):
@@ -172,18 +172,24 @@ def load(
         files |= dict.fromkeys(found, plugin)
     kinds |= (given := {checked(element, element.__name__).kind: element for element in elements})
     files = {kind: file for kind, file in files.items() if kind not in given}
-    with _mistakes_of_values():
+    with mistakes_of_python():
         scene = scene_file.load(path, texts(values), kinds)
     return LoadedScene(scene, Path(path), kinds, files, paths)
 
 
 @contextmanager
-def _mistakes_of_values() -> Iterator[None]:
-    """Reports the mistakes of values given in Python as those of ``values``, not of the command line."""
+def mistakes_of_python(written: Path | None = None) -> Iterator[None]:
+    """Reports the mistakes of values given in Python as those of ``values``, not of the command line.
+
+    Those in a file that was ``written`` from arguments name no file.
+    """
     try:
         yield
     except SceneError as error:
-        mistakes = (replace(one, file="values") if one.file == COMMAND_LINE else one for one in error.mistakes)
+        places = {COMMAND_LINE: "values"} | ({shown(written): ""} if written else {})
+        mistakes = (
+            replace(one, file=places[one.file], line=None) if one.file in places else one for one in error.mistakes
+        )
         raise SceneError(mistakes) from None
 
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 COMMAND_LINE = "--set"
 # At most this many mistakes are reported; if there are more, one of them causes the others.
 _MOST_TOLD = 50
+# Of entries of a list with the same mistake, as many beside the first are told one by one.
+_FEW = 3
+_ALIKE = " The same is wrong with {0} more entries of {1}."
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class SceneError(ValueError):
     """A scene that cannot be run; it holds every mistake, by file and line."""
 
     def __init__(self, mistakes: Iterable[Mistake]) -> None:
-        found = _without_twins(list(dict.fromkeys(mistakes)))
+        found = _without_repeats(_without_twins(list(dict.fromkeys(mistakes))))
         files = list(dict.fromkeys(one.file for one in found))
         self.mistakes = sorted(found, key=lambda one: (files.index(one.file), one.line or math.inf))
         told = [str(mistake) for mistake in self.mistakes[:_MOST_TOLD]]
@@ -58,6 +61,21 @@ def _without_twins(mistakes: list[Mistake]) -> list[Mistake]:
     """Returns mistakes without the keys that are missing only because they are misspelt in the same table."""
     meant = {(_split(one.key)[0], one.nearest) for one in mistakes if one.nearest and "is not a key" in one.given}
     return [one for one in mistakes if one.given != "is missing" or _split(one.key) not in meant]
+
+
+def _without_repeats(mistakes: list[Mistake]) -> list[Mistake]:
+    """Returns mistakes with those that many entries of a list have in common, ``list.3``, told once."""
+    alike: dict[tuple[str, str, str], list[Mistake]] = {}
+    for one in mistakes:
+        table, name = _split(one.key)
+        alike.setdefault((one.file, table if name.isdecimal() else one.key, one.expected), []).append(one)
+    told = list[Mistake]()
+    for same in alike.values():
+        first, more = same[0], len(same) - 1
+        table, name = _split(first.key)
+        is_one = name.isdecimal() and more > _FEW
+        told += [replace(first, expected=first.expected + _ALIKE.format(more, table))] if is_one else same
+    return told
 
 
 def _split(key: str) -> tuple[str, str]:

@@ -32,7 +32,7 @@ Complain = Callable[[int, str, str | None], None]
 
 def usual(base: Scene) -> list[str]:
     """Returns the keys that are recorded unless others are asked for."""
-    return [*_USUAL, *(["stability.width_m"] if _is_pushed(base) else [])]
+    return [*_USUAL, *(["stability.width_m", "stability.frequency_Hz"] if _is_pushed(base) else [])]
 
 
 def _is_pushed(scene: Scene) -> bool:
