@@ -129,6 +129,8 @@ def test_a_plugin_of_ten_lines_is_listed_checked_run_and_replayed(tmp_path):
     result = haploop(*run, "--plugin", str(plugin), "--out", str(tmp_path / "with"))
     elements = json.loads(result.stdout)["energy"]["elements"]
     assert [element["kind"] for element in elements] == ["brake"]
+    words = haploop(*run[:-1], "--plugin", str(plugin), "--in-process", "--out", str(tmp_path / "words")).stdout
+    assert "brake (force_N 0.05 N)" in words
     assert elements[0]["true_J"] > 0
     plugin.unlink()
     assert haploop("replay", str(tmp_path / "with")).exit_code == 0

@@ -18,8 +18,8 @@ from haploop.logger import read
 from haploop.tools.draw import draw_any
 from haploop.tools.figure.data import FigureError, RunData
 from haploop.tools.figure.run_figure import draw, event_lines, key_numbers, make_figure
-from haploop.tools.figure.scene_units import element_units
 from haploop.tools.render.report import summary_table
+from haploop.tools.render.scene_units import element_units
 from helpers.runs.drawn import made
 from helpers.scenes.least import WALL, scene
 from helpers.shown import artists, axes, shown

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from haploop.tools.figure.scene_units import declared_units
+from haploop.tools.render.scene_units import declared_units
 
 GUIDE = Path(__file__).parents[2] / "docs/plugins.md"
 

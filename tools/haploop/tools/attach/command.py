@@ -21,6 +21,7 @@ from haploop.tools.attach.live_table import attach_print
 from haploop.tools.attach.plotjuggler import PORT, attach_plotjuggler
 from haploop.tools.command.options import FAILED, WRONG_USE, leave, plain_errors
 from haploop.tools.render.report import print_summary
+from haploop.tools.render.scene_units import element_units
 
 TARGETS = ("logger", "print", "plotjuggler")
 
@@ -58,7 +59,7 @@ def attach_logger(run_id: str | Elsewhere | None, out: Path | None) -> None:
     finally:
         context.destroy(linger=500)
         discard(directory, is_new)  # where nothing was logged
-    print_summary(summary)
+    print_summary(summary, (), element_units())
     print(directory)
     if summary["ended"] == "failed":
         leave(summary["why"], FAILED)

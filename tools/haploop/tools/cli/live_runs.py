@@ -66,7 +66,7 @@ class RecordedRun:
 
     def units(self, scene: Scene, keys: Iterable[str]) -> dict[str, str]:
         """Returns the units of these keys of a scene, and units by kind and parameter; leaves out keys without one."""
-        from haploop.tools.figure.scene_units import element_units, unit_at
+        from haploop.tools.render.scene_units import element_units, unit_at
 
         kinds = element_units()
         return kinds | {key: unit for key in keys if (unit := unit_at(scene, key, kinds))}

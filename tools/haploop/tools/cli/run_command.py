@@ -74,6 +74,7 @@ def run(
         from haploop.tools.cli.view import viewing
         from haploop.tools.render.progress import ProgressLine
         from haploop.tools.render.report import print_summary
+        from haploop.tools.render.scene_units import units_of
 
     with viewing(view, in_process, until_closed) as viewer, plain_errors():
         rate = parse_pace(pace or ("1" if view and clock == "run" else "free"))
@@ -132,7 +133,7 @@ def run(
         if json:
             print_json({**summary, "directory": str(prepared.out), "notes": noted})
         else:
-            print_summary(summary, noted)
+            print_summary(summary, noted, units_of(prepared.kinds))
             print(prepared.out)
         if summary["ended"] == "failed":
             leave(f"The run failed: {summary['why']}.", FAILED)

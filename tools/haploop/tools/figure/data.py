@@ -14,7 +14,7 @@ from haploop.launch.spec import PLUGINS
 from haploop.logger.summary import Summary
 from haploop.protocol.changes import Event, Span, changes_of, happened_at, spans
 from haploop.protocol.scene.scene import ElementTable, Scene, Wall
-from haploop.tools.figure.scene_units import declared_units, element_units
+from haploop.tools.render.scene_units import declared_units, element_units
 
 Floats = np.ndarray
 # Longest time of the last contact that the close view shows, and of the first that the loops show, s.

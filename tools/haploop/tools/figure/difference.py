@@ -14,8 +14,8 @@ from haploop.protocol.scene.table import Tables
 from haploop.tools.figure.data import TOGETHER, RunData
 from haploop.tools.figure.event_words import event_words
 from haploop.tools.figure.run_names import run_names
-from haploop.tools.figure.scene_units import unit_at
 from haploop.tools.render.report import plant_books
+from haploop.tools.render.scene_units import unit_at
 from haploop.tools.render.terminal import told
 
 Pair = tuple[Any, Any]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from haploop.protocol.changes import Change, describe, is_change
 from haploop.tools.figure.data import RunData
-from haploop.tools.figure.scene_units import unit_at
+from haploop.tools.render.scene_units import unit_at
 
 
 def event_words(run: RunData) -> list[str]:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
 # What has room in the table and below the figure; names of books that are longer are set smaller.
-_MOST_BOOKS, _NAME_LETTERS, _MOST_LINES, _LINE_LETTERS = 7, 56, 2, 225
+_MOST_BOOKS, _NAME_LETTERS, _MOST_LINES, _LINE_LETTERS = 5, 56, 2, 225
 
 # Badge of a run that failed, and how its summary says so.
 _FAILED = "failed"
@@ -67,8 +67,10 @@ def make_figure(run: RunData) -> Figure:
     position, force, energy = (body.add_subplot(grid[row, 0]) for row in range(3))
     position_panel(position, run, run.span_s, "Position")
     force_panel(force, run, run.span_s, "Force by part")
+    # The books name every element; beyond the first two they need no place in the legend.
+    later = [span.name for span in run.history.elements[:1:-1]]
     for ax in (position, force):
-        style.legend(ax, spare=(*run.plant_forces_N, "total", "wall"))
+        style.legend(ax, spare=(*run.plant_forces_N, *later, "total", "wall"))
         ax.axvspan(*close_s, color=style.CLOSE, alpha=0.5, zorder=0.5, linewidth=0)
     books = run.books()
     colours = style.OF_THE_PLANT | {"wall": style.WALL, TOGETHER: style.INK}

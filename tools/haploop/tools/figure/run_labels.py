@@ -8,7 +8,7 @@ from typing import Any
 from haploop.protocol.changes import describe
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.difference import scene_value, unlike_keys
-from haploop.tools.figure.scene_units import unit_at
+from haploop.tools.render.scene_units import unit_at
 from haploop.tools.render.units import parameters
 
 # Differences of scenes, and letters of a title, that a line of a legend has room for.

@@ -8,10 +8,10 @@ from haploop.launch.foreign import described
 from haploop.launch.scene.mistakes import counted
 from haploop.tools.render.cause import SWINGS, by_trial, likely_cause
 from haploop.tools.render.terminal import console, make_facts, make_table, told, verdict_style
-from haploop.tools.render.units import amount, fixed, parameters, spring
+from haploop.tools.render.units import NO_UNITS, amount, fixed, parameters, spring
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from rich.console import RenderableType
     from rich.table import Table
@@ -70,16 +70,16 @@ def noted(notes: Sequence[str]) -> str:
     return words.format(count=len(notes), first=notes[0]) if notes else ""
 
 
-def print_summary(summary: Summary, notes: Sequence[Note] = ()) -> None:
-    console().print(summary_table(summary, notes))
+def print_summary(summary: Summary, notes: Sequence[Note], units: Mapping[str, str]) -> None:
+    console().print(summary_table(summary, notes, units))
 
 
-def summary_table(summary: Summary, notes: Sequence[Note] = ()) -> RenderableType:
+def summary_table(summary: Summary, notes: Sequence[Note] = (), units: Mapping[str, str] = NO_UNITS) -> RenderableType:
     """Makes the report of a run from its summary: verdict, key numbers and every book of energy.
 
     Of the ``notes`` on its scene, those on why the device does not touch the wall stand at the verdict of a run without
     contact. How many notes there are stands at the end, beside the verdict, since the report is longer than many a
-    terminal.
+    terminal. ``units`` are those of the elements' parameters, as ``units_of`` returns them.
     """
     from rich.console import Group
     from rich.text import Text
@@ -105,7 +105,7 @@ def summary_table(summary: Summary, notes: Sequence[Note] = ()) -> RenderableTyp
     end = (
         [Text.assemble("Verdict: ", (word, verdict_style(word)), ". ", (noted(notes), "bold yellow"))] if notes else []
     )
-    return Group(*parts, make_facts(_key_figures(summary)), _books(summary["energy"], control_rate), *end)
+    return Group(*parts, make_facts(_key_figures(summary)), _books(summary["energy"], control_rate, units), *end)
 
 
 def _key_figures(summary: Summary) -> list[tuple[str, str]]:
@@ -176,7 +176,7 @@ def leak_rows(wall: Summary) -> dict[str, float | None]:
     return rows | {HELD: 0.0 if is_zero else ideal_J}
 
 
-def _books(energy: Summary, control_rate: float) -> Table:
+def _books(energy: Summary, control_rate: float, units: Mapping[str, str]) -> Table:
     numbers = ("at work", "true", "sampled")
     table = make_table("energy taken out of the device by", *numbers, numbers=numbers)
     wall = energy["wall"]
@@ -185,7 +185,7 @@ def _books(energy: Summary, control_rate: float) -> Table:
         for words, value_J in leak_rows(wall).items():
             table.add_row(f"  {words}", "", amount(value_J, "J"), "")
     for element in energy["elements"]:
-        values = parameters(element["parameters"])
+        values = parameters({"kind": element["kind"], **element["parameters"]}, units)
         ticks = f"{element['from_tick'] / control_rate:g}–{element['to_tick'] / control_rate:g} s"
         name = element["kind"] + (f" ({values})" if values else "")
         table.add_row(name, ticks, amount(element["true_J"], "J"), amount(element["sampled_J"], "J"))

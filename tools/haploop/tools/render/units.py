@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-_NO_UNITS: Mapping[str, str] = MappingProxyType({})
+NO_UNITS: Mapping[str, str] = MappingProxyType({})
 PREFIXES = {1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
 
 
@@ -61,7 +61,7 @@ def spring(stiffness_N_m: float | None) -> str:
     return f"{fixed(stiffness_N_m)} N/m"
 
 
-def parameters(table: dict[str, Any], units: Mapping[str, str] = _NO_UNITS) -> str:
+def parameters(table: dict[str, Any], units: Mapping[str, str] = NO_UNITS) -> str:
     """Returns an element's parameters in short, ``"mass 0.01 kg, always"``; that it acts in contact is not mentioned.
 
     ``units`` are by kind and parameter (``damping.damping``); a parameter without an entry is shown without a unit.

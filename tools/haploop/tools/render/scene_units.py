@@ -6,7 +6,7 @@ import ast
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
-from typing import get_type_hints
+from typing import TYPE_CHECKING, get_type_hints
 
 from haploop.controller.dissipation.registry import PluginError, registry
 from haploop.protocol.quantity import Quantity
@@ -14,14 +14,21 @@ from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.protocol.scene.table import Table
 
+if TYPE_CHECKING:
+    from haploop.controller.dissipation import Element
+
 
 @cache
 def element_units() -> dict[str, str]:
     """Returns units by kind and parameter (``damping.damping``); none where an installed element does not load."""
     try:
-        kinds = registry()
+        return units_of(registry())
     except PluginError:
         return {}
+
+
+def units_of(kinds: Mapping[str, type[Element]]) -> dict[str, str]:
+    """Returns the units of the parameters of these elements, by kind and parameter."""
     return {f"{kind}.{name}": of.unit for kind, it in kinds.items() for name, (of, _) in it.parameters().items()}
 
 
