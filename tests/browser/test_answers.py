@@ -93,6 +93,9 @@ def test_what_the_window_sees_is_an_outline_and_says_that_nothing_is_known_of_st
         assert style(page, "borderTopStyle") == "dashed"
         still(page)
         assert style(page, "backgroundColor") == "rgba(0, 0, 0, 0)"
+    for word, told in (("swinging", "in 1.00–1.50 s, while its hand moves"), ("no swing seen", "in 1.00–1.50 s")):
+        stand_in.state(sight=sight | {"word": word}, hand_moves=True)
+        expect(page.locator("#seen")).to_have_text(told)
     stand_in.state(sight=sight | {"word": "settling", "from_s": 1.2, "so_far": True})
     expect(page.locator("#verdict span")).to_have_text("settling")
     expect(page.locator("#seen")).to_have_text("so far: 0.30 of 0.5 s")

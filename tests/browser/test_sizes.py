@@ -155,17 +155,23 @@ def test_on_a_phone_fingers_find_their_targets(stand_in, open_page):
 
 
 @pytest.mark.slow
-def test_on_a_phone_one_row_of_controls_floats_runs_have_the_whole_width_and_every_chart_its_times(stand_in, open_page):
+def test_on_a_phone_one_row_of_controls_floats_runs_have_a_row_and_every_chart_its_times(stand_in, open_page):
     page = shown(stand_in, open_page, PHONE, "light", has_touch=True, is_mobile=True)
     page.evaluate("scrollTo(0, 1000)")
     floating = [box for row in page.locator("nav > *").all() if (box := row.bounding_box()) and box["y"] > 0]
     assert len(floating) == 1
     assert floating[0]["height"] < 60
-    for picker in ("#run", "#overlay", "#swap-element", "#swap-kind"):
+    for picker in ("#swap-element", "#swap-kind"):
         assert page.locator(picker).bounding_box()["width"] > 300, picker
+    run, over = (page.locator(picker).bounding_box() for picker in ("#run", "#overlay"))
+    assert run["y"] == over["y"]
+    assert run["width"] + over["width"] > 290
     for chart in ("position", "force", "energy"):
         plot, over = (page.locator(f"#{chart} {part}").bounding_box() for part in (".plot", ".u-over"))
         assert plot["y"] + plot["height"] - over["y"] - over["height"] > 30, chart
+    for word in page.locator("nav .joined > .word").all():
+        expect(word).to_be_visible()
+    assert page.locator("#position").bounding_box()["y"] + page.evaluate("scrollY") < PHONE["height"] / 2
     stand_in.state(**ENDED)
     expect(page.locator("#to-forms")).to_be_hidden()
 

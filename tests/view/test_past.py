@@ -51,6 +51,21 @@ def test_a_recorded_run_is_opened_with_its_numbers_events_and_verdict(recorded):
     assert (longer["from_s"], longer["to_s"]) == (0.0, 1.501)  # the end of the last tick is drawn, too
 
 
+@pytest.mark.parametrize(
+    ("force", "moves"),
+    [
+        ({"kind": "sine", "amplitude": 0.1, "frequency": 5.0, "offset": -0.5}, True),
+        ({"kind": "ramp", "value": -0.5, "rise_time": 0.2}, False),
+        ({"kind": "ramp", "value": -0.5, "rise_time": 0.9}, True),
+    ],
+)
+def test_a_hand_that_still_moves_is_told_beside_what_is_seen(tmp_path, monkeypatch, force, moves):
+    monkeypatch.chdir(tmp_path)
+    scene = load("fig6c", {"duration": 1.0, "hand.force": force, "run.verdict": "window"})
+    run(scene, out="runs/one")
+    assert state(PastSession(next(iter(LiveRuns().past()))))["hand_moves"] is moves
+
+
 @pytest.mark.slow
 def test_the_loop_of_a_run_that_has_ended_goes_to_its_end_and_no_further(tmp_path, monkeypatch):
     """The row of its end state is filled with numbers that are none, of which a wall's curve would be, too."""

@@ -12,6 +12,8 @@ import numpy as np
 
 from haploop.logger.summary import finite
 from haploop.protocol.changes import KINDS, Event, describe, happened_at
+from haploop.protocol.scene.hand_force import constant_from_s
+from haploop.protocol.scene.scene import Scene, hand_is_unmodelled
 from haploop.protocol.transport.wire import Message
 from haploop.view.receive.run_session import RunSession
 
@@ -146,6 +148,7 @@ def state(session: RunSession) -> Message:
         "no_limit": session.clock.limit if isinstance(session.clock.limit, str) else "",
         "summary": summary,
         "sight": sight and dataclasses.asdict(sight),
+        "hand_moves": sight is not None and _hand_moves(session.scene, sight.from_s),
     }
     # Verdict and figures are those of the summary once there is one, else of the newest status of the logger.
     judged = (summary, summary["window"], summary["energy"]) if summary else (session.status,) * 3
@@ -153,6 +156,12 @@ def state(session: RunSession) -> Message:
         message |= {name: entry.get(name) for name in names}
     # Options are by far the largest part, and have been fit for JSON since they came.
     return {**finite(message), "options": None if session.outcome else session.clock.options}
+
+
+def _hand_moves(scene: Scene, from_s: float) -> bool:
+    """Tells whether the hand's own force may change after a time in s, so that what moves then may be its motion."""
+    force = scene.hand.force if scene.hand else None
+    return hand_is_unmodelled(scene) or from_s < constant_from_s(force)
 
 
 class EventLine(TypedDict):

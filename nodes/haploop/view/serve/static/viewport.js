@@ -1,7 +1,8 @@
 // The interval of simulated time that is shown: the last seconds, as they come, or one that is frozen.
 
 export const SPANS_S = [0.2, 1, 2, 10, null];
-const LEAST_POINTS = 200;
+// Fewer than this would make steps of a buzz on a narrow screen.
+const LEAST_POINTS = 800;
 const MOST_POINTS = 2000;
 const LEAST_SPAN_S = 0.005;
 

@@ -59,7 +59,7 @@ function showVerdict(state) {
   sought.toggleAttribute("data-proviso", provisos.length > 0 || still !== "");
   sought.dataset.is = isJudged(state) ? "judged" : (is ?? "seen");
   sought.title = (isJudged(state) ? state.verdict_rule : sight?.why) ?? "";
-  put(byId("seen"), isJudged(state) ? [...provisos, still].filter(Boolean).join(", ") : is in NOT_YET ? "" : seen(sight));
+  put(byId("seen"), isJudged(state) ? [...provisos, still].filter(Boolean).join(", ") : is in NOT_YET ? "" : seen(state));
   sign(sought, `verdict-${still && known === "steady" ? "limit-cycle" : known}`, told(state) || "no verdict");
 }
 
@@ -76,10 +76,12 @@ function moved({ verdict, sight }) {
 }
 
 /** The time to which a word refers: how much of the half second that it needs has passed, or from when to when. */
-function seen(sight) {
+function seen({ sight, hand_moves: handMoves }) {
   if (!sight) return "";
   const { from_s: from, to_s: to, so_far: soFar } = sight;
-  return soFar ? `so far: ${steady(to - from, 2)} of 0.5 s` : `in ${steady(from, 2)}–${steady(to, 2)} s`;
+  if (soFar) return `so far: ${steady(to - from, 2)} of 0.5 s`;
+  const mayBeIts = handMoves && (isSwinging(sight) || sight.word === "moving");
+  return `in ${steady(from, 2)}–${steady(to, 2)} s${mayBeIts ? ", while its hand moves" : ""}`;
 }
 
 function stiffness({ displayed_stiffness_N_m: displayed, wall, sight, verdict }) {
