@@ -73,6 +73,8 @@ CASES: list[tuple[dict[str, Any], dict[str, Any], str]] = [
      "ends at 0.98 s and the run at 1 s; its last value, -10 N, is held"),
     ({"hand": PUSHED | {"force": recorded(99, -10.0)}}, {"hand": PUSHED | {"force": recorded(2, -10.0)}},
      "The recorded force ends at"),
+    ({"hand": PUSHED | {"force": recorded(99, -10.0)}}, {"hand": PUSHED | {"force": recorded(100, -10.0)}},
+     "The recorded force ends at"),
     ({"hand": PUSHED, "duration": 1e5}, {"hand": PUSHED, "duration": 1e4}, "The run has 1e+08 ticks"),
     ({"hand": PUSHED, "dissipation": [{"kind": "damping", "damping": 1.0}]},
      {"hand": PUSHED, "dissipation": [{"kind": "damping", "damping": 1.0, "acts": "always"}]}, "Nothing is ever in"),

@@ -31,11 +31,15 @@ def _long(scene: Scene) -> Found | None:
 
 
 def _trace_too_short(scene: Scene) -> Found | None:
-    """Tells whether a recorded force ends before the run, at a force other than 0; few samples are no recording."""
+    """Tells whether a recorded force ends before the run, at a force other than 0; few samples are no recording.
+
+    The last sample holds until the one that would have followed it.
+    """
     force = scene.hand.force if scene.hand else None
     if not isinstance(force, Trace) or len(force.time) < _RECORDED_SAMPLES:
         return None
-    if not force.force[-1] or force.time[-1] >= scene.duration:
+    period_s = force.time[-1] - force.time[-2]
+    if not force.force[-1] or force.time[-1] + 1.01 * period_s >= scene.duration:
         return None
     return {"end_s": force.time[-1], "duration_s": scene.duration, "last_N": force.force[-1]}
 
