@@ -29,7 +29,12 @@ SAVED_HEAD = """async ([source, colour]) => {
 }"""
 
 pytestmark = pytest.mark.slow
-ROWS = [("hand", -2e-3), ("delay", -1e-3), ("damping", 2.5e-3), ("put into store", 5e-4)]
+ROWS = [
+    ("hand", "flow", -2e-3),
+    ("delay", "flow", -1e-3),
+    ("damping", "flow", 2.5e-3),
+    ("put into store", "store", 5e-4),
+]
 
 
 def with_header(data: bytes, **more) -> bytes:
@@ -41,25 +46,29 @@ def with_header(data: bytes, **more) -> bytes:
 
 
 def test_bars_of_energy_lie_left_of_zero_where_they_feed_and_right_where_they_take(stand_in, page):
-    rows = [{"name": name, "total_J": joules, "window_J": joules / 4} for name, joules in ROWS]
+    rows = [{"name": name, "is": what, "total_J": joules, "window_J": joules / 4} for name, what, joules in ROWS]
     page.click("[data-panel=energy]")
     stand_in.asked(lambda watch: watch["panel"] == "energy")
     stand_in.show(with_header(contact(), budget={"from_s": 1.0, "to_s": 3.0, "about_s": 0.0, "rows": rows}))
     expect(page.locator("#budget output")).to_have_text(["−2.00 mJ", "−1.00 mJ", "2.50 mJ", "500 µJ"])
     zero = page.locator("#budget b").bounding_box()
-    for (name, joules), bar in zip(ROWS, page.locator("#budget .bar").all(), strict=True):
+    for (name, _, joules), bar in zip(ROWS, page.locator("#budget .bar").all(), strict=True):
         box, track = bar.bounding_box(), bar.locator("..").bounding_box()
         middle = track["x"] + track["width"] / 2
         assert abs(zero["x"] + zero["width"] / 2 - middle) < 3, "the 0 stands where the bars begin"
         assert (box["x"] + box["width"] / 2 < middle) == (joules < 0), name
-    assert "feeds" in page.get_attribute("#budget .bars > div >> nth=0", "title")
+    titles = [row.get_attribute("title") for row in page.locator("#budget .bars > div").all()]
+    assert "feeds the device" in titles[0]
+    assert "takes out of the device" in titles[2]
+    assert titles[3] == "put into store: put into store 500 µJ"
+    assert [row.get_attribute("class") for row in page.locator("#budget .bars > div").all()] == [None] * 3 + ["store"]
     page.click("#budget label:has-text('power')")
     expect(page.locator("#budget output").first).to_have_text("−250 µW")
 
 
 def test_a_cause_that_comes_later_has_its_bar_where_it_is_told_and_not_below_the_store(stand_in, page):
     def told(*names):
-        rows = [{"name": name, "total_J": 1e-3, "window_J": 0.0} for name in names]
+        rows = [{"name": name, "is": "flow", "total_J": 1e-3, "window_J": 0.0} for name in names]
         stand_in.show(with_header(contact(), budget={"from_s": 1.0, "to_s": 3.0, "about_s": 0.0, "rows": rows}))
         expect(page.locator("#budget dt")).to_have_text([*names])
 

@@ -85,4 +85,6 @@ def test_what_the_actuators_limits_kept_back_is_not_said_to_be_in_store(tmp_path
     total = {row["name"]: row["total_J"] for row in found["rows"]}
     assert total["kept back by the actuator's limits"] == pytest.approx(summary["energy"]["actuator_J"], rel=0.02)
     assert total["kept back by the actuator's limits"] > 0.0
+    no_flow = {row["name"]: row["is"] for row in found["rows"] if row["is"] != "flow"}
+    assert no_flow == {"kept back by the actuator's limits": "kept", "put into store": "store"}
     assert abs(sum(total.values())) < 1e-12 * summary["energy"]["moved_J"]

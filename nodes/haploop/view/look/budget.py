@@ -20,14 +20,17 @@ _OF_WALL = (
     ("quantisation", "quantised", "sampled_and_held"),
     ("delay", WALL_BOOK, "quantised"),
 )
+_KEPT, _STORE = "kept back by the actuator's limits", "put into store"
+_NO_FLOW = {_KEPT: "kept", _STORE: "store"}
 
 
 def budget(history: History, from_tick: int, end: int) -> dict[str, Any] | None:
     """Returns every cause with its energy in J, negative where it feeds the device, positive where it takes energy out.
 
-    ``rows`` are {name, total_J, window_J}: since the start of the run, and in the ticks from ``from_tick`` to before
-    ``end``. They sum to 0 but for rounding, since the books close: what is put into store counts as taken out, and so
-    does what the wall's and the elements' commanded forces would have given, but for the actuator's limits.
+    ``rows`` are {name, is, total_J, window_J}: since the start of the run, and in the ticks from ``from_tick`` to
+    before ``end``; a row ``is`` a flow, or what is in store, or was kept back. They sum to 0 but for rounding, since
+    the books close: what is put into store counts as taken out, and so does what the wall's and the elements' commanded
+    forces would have given, but for the actuator's limits.
     ``from_s`` is where the window begins, later than requested where no energy is known before; it is exact to within
     ``about_s`` where the past is held coarsely. Returns None without any energy.
     """
@@ -40,7 +43,7 @@ def budget(history: History, from_tick: int, end: int) -> dict[str, Any] | None:
     now, (before, about) = _at(series, names, end - 1)[0], _at(series, names, first)
     total, window = (dict(zip(names, values.tolist(), strict=True)) for values in (now, now - before))
     rows = [
-        {"name": label, "total_J": sum(sign * total[name] for sign, name in parts),
+        {"name": label, "is": _NO_FLOW.get(label, "flow"), "total_J": sum(sign * total[name] for sign, name in parts),
          "window_J": sum(sign * window[name] for sign, name in parts)}
         for label, parts in _causes(names, {**_LABELS, **book_names(history)})
     ]  # fmt: skip
@@ -76,6 +79,6 @@ def _causes(names: Sequence[str], labels: Mapping[str, str]) -> Iterator[tuple[s
         if name.endswith("_heat"):
             yield f"heat in {name.removesuffix('_heat')}", [(1.0, name)]
     if "actuator" in names:
-        yield "kept back by the actuator's limits", [(1.0, "actuator")]
+        yield _KEPT, [(1.0, "actuator")]
     stored = [*(name for name in _STORED if name in names), *(["ideal"] if has_wall else [])]
-    yield "put into store", [(1.0, name) for name in stored]
+    yield _STORE, [(1.0, name) for name in stored]

@@ -4,8 +4,11 @@ import { amount } from "../drawing/amounts.js";
 import { make, put } from "../dom.js";
 
 const MODES = [["total", "since start"], ["window", "window"], ["power", "power"]];
-const STORE = "put into store";
-const KEPT = "kept back by the actuator's limits";
+// What a row that is no flow of energy is said to be, by its sign.
+const NO_FLOW = {
+  kept: ["commanded, but not given:", "commanded, but not given:"],
+  store: ["given back from store", "put into store"],
+};
 
 export class BudgetPanel {
   /** @param {HTMLElement} host takes the bars. */
@@ -43,8 +46,8 @@ export class BudgetPanel {
     const gone = new Set(this.rows.keys());
     for (const row of rows) {
       gone.delete(row.name);
-      if (!this.rows.has(row.name)) this.add(row.name);
-      this.fill(row.name, of(row), largest, unit);
+      if (!this.rows.has(row.name)) this.add(row);
+      this.fill(row, of(row), largest, unit);
     }
     for (const name of gone) {
       this.rows.get(name).row.remove();
@@ -62,15 +65,15 @@ export class BudgetPanel {
     return `${since}${rough}. The bars sum to zero: the books close.`;
   }
 
-  add(name) {
+  add({ name, is }) {
     const bar = make("span", { class: "bar" });
     const value = make("output");
-    const row = make("div", name === STORE || name === KEPT ? { class: "store" } : {}, make("dt", {}, name), make("dd", {}, make("span", { class: "track" }, bar), value));
+    const row = make("div", is in NO_FLOW ? { class: "store" } : {}, make("dt", {}, name), make("dd", {}, make("span", { class: "track" }, bar), value));
     this.rows.set(name, { row, bar, value });
     this.list.append(row);
   }
 
-  fill(name, value, largest, unit) {
+  fill({ name, is }, value, largest, unit) {
     const { row, bar, value: output } = this.rows.get(name);
     const share = (50 * Math.abs(value)) / largest;
     bar.style.width = `${share}%`;
@@ -78,13 +81,8 @@ export class BudgetPanel {
     row.dataset.does = value < 0 ? "feeds" : "dissipates";
     const isNothing = Math.abs(value) < 1e-9 * largest;
     put(output, amount(isNothing ? 0 : value, unit));
-    row.title = `${name}: ${this.verb(name, value, isNothing)} ${amount(Math.abs(value), unit)}`;
-  }
-
-  verb(name, value, isNothing) {
-    if (isNothing) return "about nothing,";
-    if (name === KEPT) return "commanded, but not given:";
-    if (name === STORE) return value < 0 ? "given back from store" : "put into store";
-    return value < 0 ? "feeds the device" : "takes out of the device";
+    row.title = `${name}: ${isNothing ? "about nothing," : verb(is, value)} ${amount(Math.abs(value), unit)}`;
   }
 }
+
+const verb = (is, value) => (NO_FLOW[is] ?? ["feeds the device", "takes out of the device"])[value < 0 ? 0 : 1];
