@@ -5,6 +5,8 @@ import { make, put } from "../dom.js";
 
 const STEPS = 200;
 const DIGITS = 3;
+// The choice is made when no key has come for this long.
+const KEYS_MS = 400;
 
 export class Slider {
   /**
@@ -14,13 +16,22 @@ export class Slider {
   constructor(field, released) {
     this.field = field;
     this.centre = 0;
+    this.byKey = false;
     this.limit = null;
     this.input = make("input", { type: "range", min: String(-STEPS), max: String(STEPS), "aria-label": `${field.name}, coarse` });
     this.input.addEventListener("input", () => {
       field.input.value = plain(Number((this.centre * field.factor * 10 ** (Number(this.input.value) / STEPS)).toPrecision(DIGITS)));
       field.input.dispatchEvent(new Event("input", { bubbles: true }));
     });
-    this.input.addEventListener("change", released);
+    // A key that is held down is one choice, not one for each step.
+    let waiting = null;
+    const settle = (after_ms) => {
+      clearTimeout(waiting);
+      waiting = setTimeout(released, after_ms);
+    };
+    this.input.addEventListener("keydown", () => (this.byKey = true));
+    this.input.addEventListener("pointerdown", () => (this.byKey = false));
+    this.input.addEventListener("change", () => (this.byKey ? settle(KEYS_MS) : settle(0)));
     this.why = make("span", { class: "unit" });
     field.element.append(this.input, this.why);
   }
