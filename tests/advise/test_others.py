@@ -22,7 +22,7 @@ def test_no_element_is_both_compared_by_its_wall_and_known_to_hide_it_and_few_ar
     assert not set(OTHERS) & set(HIDING)
     assert {family.name for family in STABILIZERS if family not in (*OTHERS, *HIDING) and family.parts} == {
         "damping", "bidirectional inertia", "unidirectional inertia", "damping and unidirectional inertia",
-        "adaptive damping and inertia",
+        "passivity controller with inertia",
     }  # fmt: skip
 
 

@@ -27,14 +27,14 @@ def test_the_sentences_follow_from_the_rankings():
     assert told[1].endswith("or nothing if there is none: nothing on a device.")
     assert told[2] == "Damping cannot be told apart from no element on any of these loops."
     assert told[4].endswith("so adaptive inertia does not help, as far as can be told.")
-    helped = sentences([compared(adaptive_damping_and_inertia=2000.0)])
-    assert "inertia holds more on a device (1 of 1) than adaptive damping; adaptive inertia cannot" in helped[4]
+    helped = sentences([compared(passivity_controller_with_inertia=2000.0)])
+    assert "inertia holds more on a device (1 of 1) than passivity controller; adaptive inertia cannot" in helped[4]
     assert helped[4].endswith("so adaptive inertia helps, and on a device it is what to take.")
-    assert ": adaptive damping and inertia on" in helped[1]
-    both = sentences([compared(adaptive_damping_and_inertia=2000.0, damping=2000.0)])
+    assert ": passivity controller with inertia on" in helped[1]
+    both = sentences([compared(passivity_controller_with_inertia=2000.0, damping=2000.0)])
     assert ": damping on" in both[1], "the simpler of two that are alike"
     assert both[4].endswith("but nowhere more than every other element.")
-    mixed = sentences([compared(adaptive_damping_and_inertia=2000.0, adaptive_inertia=500.0)])
+    mixed = sentences([compared(passivity_controller_with_inertia=2000.0, adaptive_inertia=500.0)])
     assert mixed[4].endswith("helps on some loops and harms on others.")
     harmful = sentences([compared(unidirectional_inertia=500.0, adaptive_inertia=500.0)])
     assert harmful[3].startswith("Unidirectional inertia holds less on a device (1 of 1) than no element; ")

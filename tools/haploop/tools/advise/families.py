@@ -70,9 +70,9 @@ BIDIRECTIONAL = Family("bidirectional inertia", (("bidirectional-inertia", "mass
 UNIDIRECTIONAL = Family("unidirectional inertia", (("unidirectional-inertia", "mass"),))
 BOTH = Family("damping and unidirectional inertia", DAMPING.parts + UNIDIRECTIONAL.parts)
 SINGLE = (DAMPING, BIDIRECTIONAL, UNIDIRECTIONAL)
-ADAPTIVE_DAMPING = Family("adaptive damping", (("passivity-controller", "damping"),))
+ADAPTIVE_DAMPING = Family("passivity controller", (("passivity-controller", "damping"),))
 ADAPTIVE_INERTIA = Family("adaptive inertia", (("adaptive-inertia", "mass"),))
-ADAPTIVE_BOTH = Family("adaptive damping and inertia", (("adaptive-inertia", "damping"), ("adaptive-inertia", "mass")))
+ADAPTIVE_BOTH = Family("passivity controller with inertia", (("adaptive-inertia", "damping"), ("adaptive-inertia", "mass")))
 FORCE_BOUNDING = Family("force bounding", (("force-bounding", "share"),), "always")
 COUPLING = Family(
     "virtual coupling",
@@ -88,8 +88,8 @@ STABILIZERS = (
     UNIDIRECTIONAL,
     BOTH,
     ADAPTIVE_DAMPING,
-    Family("adaptive damping, reset", (("passivity-controller-reset", "damping"),)),
-    Family("adaptive damping, reference", (("passivity-controller-reference", "damping"),)),
+    Family("passivity controller, reset", (("passivity-controller-reset", "damping"),)),
+    Family("passivity controller, reference", (("passivity-controller-reference", "damping"),)),
     ADAPTIVE_INERTIA,
     ADAPTIVE_BOTH,
     FORCE_BOUNDING,

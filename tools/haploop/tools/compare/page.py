@@ -69,7 +69,7 @@ and numbers that the device files assume are taken as given. Parameters are tune
 A virtual coupling holds less than its wall. What is marked as at the end of a search may hold more with other
 parameters."""
 
-# What inertia adds: to adaptive damping, and by itself.
+# What inertia adds: to a passivity controller, and by itself.
 _ADAPTIVE = ((ADAPTIVE_BOTH, ADAPTIVE_DAMPING), (ADAPTIVE_INERTIA, NOTHING))
 # A loop by the names of its device and of itself.
 Place = tuple[str, str]
