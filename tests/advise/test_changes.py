@@ -21,9 +21,11 @@ from haploop.tools.advise.advice import Changed
 from haploop.tools.advise.changes import Borne, changed_limits
 from haploop.tools.advise.command import breaks_words
 from haploop.tools.advise.families import DAMPING, NOTHING, Family, Values
+from haploop.tools.advise.figure import figure_of
 from haploop.tools.advise.report import _changes as changes_table
 from haploop.tools.advise.report import answer, describe, describe_run, format_limit
 from haploop.tools.advise.search import STAGES, Found
+from haploop.tools.advise.subject import make_subject
 from haploop.tools.advise.walls.felt import felt_force_N
 from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.walls.store import Failure, Job, Store
@@ -102,7 +104,7 @@ def told_with(row: Changed, values: Values = (5.0,)) -> dict[str, str]:
     told: Any = SimpleNamespace(
         is_ideal=False, hand=None, provisos=("only friction holds it",), changed=(row,), without=(), published=(),
         own=None, found=found_with(DAMPING if values else NOTHING, values, 3230.0, 1660.0), breaks=None, assumed=(),
-        scene=None,
+        scene=None, unchanged=changed(1.0, 1.0),
     )  # fmt: skip
     return dict(answer(told))
 
@@ -148,6 +150,31 @@ def test_by_how_much_the_force_jumps_at_a_count_is_told_with_how_much_of_it_a_ha
         "with each count of the encoder, the wall's force changes by 10.0 mN: in a slow press, grit"
     )
     assert "at a count" not in dict(answer(replace(ADVICE, scene=replace(of, encoder=None))))
+
+
+def test_of_a_loop_that_bears_no_wall_only_what_makes_one_possible_is_told() -> None:
+    none, some = Borne(Limit(0.0, 1.0), Limit(0.0, 1.0)), Borne(Limit(120.0, 130.0), Limit(0.0, 1.0))
+    useless, helps = Changed.from_borne("ticks halved", none, none), Changed.from_borne("delay halved", some, none)
+    found = replace(ADVICE.found, stiffness_N_m=0.0)
+    told = replace(ADVICE, found=found, unchanged=Changed.from_borne("unchanged", none, none), without=())
+    lines = dict(answer(replace(told, changed=(useless, helps))))
+    assert lines["safe up to"] == "none: no wall withstands every case"
+    assert lines["gains most"] == "delay halved: 0.12 N/mm"
+    assert "loses most" not in lines
+    nothing = replace(told, changed=(useless,))
+    assert dict(answer(nothing))["gains most"] == "no single change that was tried makes a wall possible"
+    panels = [ax for ax in figure_of(nothing).axes if ax.get_title("left")]
+    assert [ax.get_title("left") for ax in panels] == ["mine: how stiff a wall may be"]
+    assert len([ax for ax in figure_of(replace(told, changed=(helps,))).axes if ax.get_title("left")]) == 2
+
+
+def test_a_scene_without_a_wall_is_advised_as_its_device_is(tmp_path) -> None:
+    path = tmp_path / "no_wall.toml"
+    path.write_text('extends = "devices/premium15"\nduration = "2 s"\n')
+    subject = make_subject(str(path))
+    assert not subject.has_task
+    assert subject.scene.duration == 2.0
+    assert subject.scene.wall == make_subject("premium15").scene.wall
 
 
 def test_a_factor_within_what_both_limits_are_known_to_is_told_as_no_change() -> None:

@@ -44,6 +44,7 @@ NO_OTHER = (
     "None of these elements, tried with seven parameter values each, allows {0} in every corner, a tenth more "
     "than the best of the wall alone, damping and inertia: {1}."
 )
+NOR_ANY = "None of these elements, tried with seven parameter values each, allows {0} in every corner either: {1}."
 READING = (
     "Every corner: uncertain quantities 20 % more or less, assumed ones halved or doubled, in all combinations, or 32 "
     "if there are more, at holds of 0.3, 1 and 3 times the task's; a dash where an element does not allow a tenth more "
@@ -173,7 +174,7 @@ def advice(subject: Subject, trial: Trial, stage: Callable[[str], object] = lamb
     told: list[str] = []
     if found.others:
         names = "; ".join(each.name for each in found.others)
-        told.append(NO_OTHER.format(format_stiffness(found.worth_N_m, 2), names))
+        told.append((NO_OTHER if found.stiffness_N_m else NOR_ANY).format(format_stiffness(found.worth_N_m, 2), names))
     for of in found.hidden:
         told.append(HOLDS_MORE.format(of.family.name, of.family.words(of.values), format_stiffness(of.held_N_m, 2)))
     for of, below in found.fell:

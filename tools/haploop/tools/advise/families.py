@@ -72,7 +72,9 @@ BOTH = Family("damping and unidirectional inertia", DAMPING.parts + UNIDIRECTION
 SINGLE = (DAMPING, BIDIRECTIONAL, UNIDIRECTIONAL)
 ADAPTIVE_DAMPING = Family("passivity controller", (("passivity-controller", "damping"),))
 ADAPTIVE_INERTIA = Family("adaptive inertia", (("adaptive-inertia", "mass"),))
-ADAPTIVE_BOTH = Family("passivity controller with inertia", (("adaptive-inertia", "damping"), ("adaptive-inertia", "mass")))
+ADAPTIVE_BOTH = Family(
+    "passivity controller with inertia", (("adaptive-inertia", "damping"), ("adaptive-inertia", "mass"))
+)
 FORCE_BOUNDING = Family("force bounding", (("force-bounding", "share"),), "always")
 COUPLING = Family(
     "virtual coupling",

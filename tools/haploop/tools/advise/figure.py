@@ -32,6 +32,8 @@ _LIGHT, _HALF, _SOFTER = "white", "#9CC3E0", "#B07A45"
 _COLUMNS = 85, 155, 230
 # Numbers at which an axis may begin and end, in every decade.
 _ENDS = (1.0, 2.0, 5.0)
+# About where an axis lies on which there is nothing to mark.
+_NO_WALL_N_MM = 1.0
 # An axis ends at this factor below the stiffest wall; softer ones are drawn at its end, as arrows.
 _SPAN = 300.0
 
@@ -43,6 +45,8 @@ def draw(told: Advice, target: Path) -> Path:
 
 def figure_of(told: Advice) -> Figure:
     """Makes two panels: the limits of every element with formulas and published values, and those of changed devices.
+
+    The second is left out where no change makes any wall possible.
 
     Dots on one logarithmic axis, on which the length of a bar would mean nothing; the numbers stand beside it. The
     answer in words stands between the panels.
@@ -59,16 +63,18 @@ def figure_of(told: Advice) -> Figure:
         (name, textwrap.wrap(f"{words.rstrip('.')}.".replace(" %", "\u00a0%"), _LETTERS))
         for name, words in answer(told)
     ]
+    if not any(limit.stiffness_N_m for _, limit, _ in others):
+        others = []
     rows = len(told.found.bests) + len(told.formulas) + len(told.published)
     height_in = (len(headline) + sum(len(wrapped) for _, wrapped in lines)) * _LINE_IN
-    heights = [rows * _ROW_IN + _BESIDE_IN, height_in, len(others) * _ROW_IN + _BESIDE_IN]
+    heights = [rows * _ROW_IN + _BESIDE_IN, height_in, *[len(others) * _ROW_IN + _BESIDE_IN] * bool(others)]
     figure = style.empty_figure(_WIDTH_IN, sum(heights))
     from matplotlib.transforms import blended_transform_factory
 
-    above, between, below = figure.subplots(3, 1, height_ratios=heights)
+    above, between, *below = figure.subplots(len(heights), 1, height_ratios=heights)
     _answer(between, blended_transform_factory(figure.transFigure, between.transData), headline, lines)
-    stiffnesses = [_walls(above, told), _changes(below, told, others)]
-    for ax in (above, below):
+    stiffnesses = [_walls(above, told), *(_changes(ax, told, others) for ax in below)]
+    for ax in (above, *below):
         ax.set_xlim(*_ends([value / 1e3 for values in stiffnesses for value in values]))
         ax.set_xscale("log")
         style.plain_numbers(ax.xaxis)
@@ -169,7 +175,7 @@ def _beside(ax: Axes, row: float, numbers: tuple[str, str, str], bold: bool = Fa
 
 def _ends(stiffnesses: list[float]) -> tuple[float, float]:
     """Returns the round numbers around the positive ones, 1, 2 or 5 in a decade, for a logarithmic axis."""
-    real = [value for value in stiffnesses if value > 0.0] or [1.0]
+    real = [value for value in stiffnesses if value > 0.0] or [_NO_WALL_N_MM]
     most = max(real) * 1.1
     least = max(min(real) * 0.9, most / _SPAN)
     decades = range(math.floor(math.log10(least)) - 1, math.ceil(math.log10(most)) + 2)

@@ -30,6 +30,7 @@ _FELT, _FELT_BOTH = {True: "force", False: "motion"}, "force and as motion"
 _AT, _TURNS = "at {hz:.0f} Hz", "at no single frequency, turning {turns} times in {within:g} s"
 # A changed limit tells something if it differs by more than this, which is more than its tolerance.
 _TELLS = 1.2
+_NONE_MAKES = "no single change that was tried makes a wall possible"
 _NO_CHANGE, _NO_LOSS = "no single change that was tried gains a fifth", "no single change that was tried costs a sixth"
 _TUNED, _TIMES, _TIMES_ALONE = ", with the element tuned again", "{0}: {1} times", " ({0} without an element)"
 _GAINS_ALONE = "the wall without an element gains from more changes: {0}"
@@ -97,6 +98,8 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     if broken and not (told.breaks and told.breaks.run.verdict == "pushed"):
         breaks += _SHOWN_AT_END if told.breaks else _SHOWN_BY_NONE
     lines.append(("breaks first", breaks))
+    if not told.unchanged.limit.stiffness_N_m:
+        return [*lines, ("gains most", _from_none(told)), *_known(told)]
     gains = [_times(told, row) for row in told.changed if row.factor >= _TELLS]
     lines.append(("gains most", "; ".join(gains[:3]) or _NO_CHANGE + _TUNED * bool(best.values)))
     of_alone = [row for row in told.changed if row.alone_factor >= _TELLS > row.factor]
@@ -106,7 +109,21 @@ def answer(told: Advice) -> list[tuple[str, str]]:
         lines.append(("without one", _GAINS_ALONE.format("; ".join(some))))
     worst = sorted((*told.changed, *told.without), key=lambda row: row.factor)
     loses = [_times(told, row) for row in worst if row.factor * _TELLS <= 1.0]
-    lines.append(("loses most", "; ".join(loses[:3]) or _NO_LOSS))
+    return [*lines, ("loses most", "; ".join(loses[:3]) or _NO_LOSS), *_known(told)]
+
+
+def _from_none(told: Advice) -> str:
+    """Describes which changes make a wall possible where there is none without."""
+    stiffest = sorted((*told.changed, *told.without), key=lambda row: -row.limit.stiffness_N_m)
+    return (
+        "; ".join(f"{row.words}: {format_limit(row.limit)}" for row in stiffest[:3] if row.limit.stiffness_N_m)
+        or _NONE_MAKES
+    )
+
+
+def _known(told: Advice) -> list[tuple[str, str]]:
+    """Returns the lines on published values and on the scene's own wall."""
+    lines = list[tuple[str, str]]()
     if told.published:
         values = [f"{format_stiffness(value.stiffness_N_m)} ({value.by})" for value in told.published]
         lines.append(("published", ", ".join(values)))

@@ -79,7 +79,7 @@ class Subject:
 
     Attributes:
         scene: resolved; events that change it are taken as done from the start.
-        has_task: whether it came with a task of its own; a device alone, without wall and duration, has none.
+        has_task: whether it came with a task of its own; a device alone, without a wall, has none.
         notes: what was chosen or left out, one sentence each.
         assumed: numbers of the device that its file assumes and the arguments do not give.
     """
@@ -105,7 +105,7 @@ def make_subject(
     """
     path = _device(device)
     layers, notes = read_layers(path), []
-    has_task = not {"wall", "duration"}.isdisjoint(layers.data)
+    has_task = "wall" in layers.data
     if hand is None and not has_task and "hand" not in layers.data:
         hand = DEFAULT_HAND
         set_keys = [key for each in overrides if (key := each.partition("=")[0].strip()).startswith("hand.")]
@@ -115,8 +115,8 @@ def make_subject(
     if estimator is not None:
         _lay_estimator(layers, estimator)
     if not has_task:
-        task = {"title": path.stem, "duration": 1.0, "wall": {"position": 0.0, "stiffness": 1000.0}}
-        layers.lay(task, str(path))
+        wall = {"position": 0.0, "stiffness": 1000.0}
+        layers.lay({"title": path.stem, "duration": layers.data.get("duration", 1.0), "wall": wall}, str(path))
     if delay is not None:
         with contextlib.suppress(ValueError):
             delay = float(delay)

@@ -67,8 +67,8 @@ def make_figure(run: RunData) -> Figure:
     position, force, energy = (body.add_subplot(grid[row, 0]) for row in range(3))
     position_panel(position, run, run.span_s, "Position")
     force_panel(force, run, run.span_s, "Force by part")
-    # The books name every element; beyond the first two they need no place in the legend.
-    later = [span.name for span in run.history.elements[:1:-1]]
+    # The books name every element; beyond the fourth they need no place in the legend.
+    later = [span.name for span in run.history.elements[:3:-1]]
     for ax in (position, force):
         style.legend(ax, spare=(*run.plant_forces_N, *later, "total", "wall"))
         ax.axvspan(*close_s, color=style.CLOSE, alpha=0.5, zorder=0.5, linewidth=0)
