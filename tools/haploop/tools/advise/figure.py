@@ -58,11 +58,8 @@ def figure_of(told: Advice) -> Figure:
     others = [(row.words, row.limit, row.alone if has_element else None) for row in changed]
     for of, half, double in (row for row in told.assumed if moves(row[1], row[2], told.unchanged.limit)):
         others += [(f"{of.key} halved (assumed)", half, None), (f"{of.key} doubled (assumed)", double, None)]
-    headline = textwrap.wrap(told.headline, _HEADLINE_LETTERS)
-    lines = [
-        (name, textwrap.wrap(f"{words.rstrip('.')}.".replace(" %", "\u00a0%"), _LETTERS))
-        for name, words in answer(told)
-    ]
+    headline = style.wrapped(told.headline, _HEADLINE_LETTERS)
+    lines = [(name, style.wrapped(f"{words.rstrip('.')}.", _LETTERS)) for name, words in answer(told)]
     if not any(limit.stiffness_N_m for _, limit, _ in others):
         others = []
     rows = len(told.found.bests) + len(told.formulas) + len(told.published)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,7 +34,7 @@ def draw(story: Story, target: Path) -> Path:
 def make_figure(story: Story) -> Figure:
     """Makes the picture: position, force and energy over time, and two loops; FigureError without matplotlib."""
     data = story.data
-    words = [line for sentence in (story.why(), story.outcome()) for line in wrap(sentence, _LETTERS)]
+    words = [line for sentence in (story.why(), story.outcome()) for line in style.wrapped(sentence, _LETTERS)]
     header_in = _TITLE_IN + len(words) * _LINE_IN + 2.0 * _MARGIN_IN
     figure = style.empty_figure(_WIDE_IN, header_in + _CHARTS_IN)
     header, body = figure.subfigures(2, 1, squeeze=False, height_ratios=(header_in, _CHARTS_IN))[:, 0]

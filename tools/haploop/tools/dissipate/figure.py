@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -194,15 +193,15 @@ def _words(outcome: Outcome) -> list[str]:
     """Returns the lines of the notes, as wide as the figure."""
     more = len(outcome.elements) - _MOST
     notes = ([f"Left out here: {more} more element{'s' * (more > 1)}."] if more > 0 else []) + note_sentences(outcome)
-    return [line for sentence in notes for line in textwrap.wrap(sentence, _LINE_LETTERS)]
+    return [line for sentence in notes for line in style.wrapped(sentence, _LINE_LETTERS)]
 
 
 def _answer(outcome: Outcome) -> list[str]:
     """Returns the lines above the figure: whether the recording buzzes, and what the elements would have done."""
-    first = [line for each in (*uneven(outcome), buzz_sentence(outcome)) for line in textwrap.wrap(each, _LINE_LETTERS)]
+    first = [line for each in (*uneven(outcome), buzz_sentence(outcome)) for line in style.wrapped(each, _LINE_LETTERS)]
     if not (outcome.elements or outcome.force):
         return first
     sentence = conclusion(outcome)
     words = f"{sentence[:1].upper()}{sentence[1:]}"
     room = {"max_lines": _MOST_ANSWER_LINES - 1, "placeholder": " …"}
-    return [*first, *textwrap.wrap(words, _LINE_LETTERS, **room)]
+    return [*first, *style.wrapped(words, _LINE_LETTERS, **room)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -95,7 +94,7 @@ def _notes_below(runs: Sequence[RunData], names: Sequence[str]) -> list[tuple[st
     lines: list[tuple[str, list[str]]] = []
     for words, places in told.items():
         whose = "all runs" if len(places) == len(runs) else ", ".join(names[place] for place in places)
-        first, *more = textwrap.wrap(f"{whose}: {words}", _LINE_LETTERS)
+        first, *more = style.wrapped(f"{whose}: {words}", _LINE_LETTERS)
         lines += [(first, [_COLOURS[place] for place in places]), *((each, []) for each in more)]
     return lines
 

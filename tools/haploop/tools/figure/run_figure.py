@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -59,7 +58,7 @@ def make_figure(run: RunData) -> Figure:
     rows = 3 + bool(own_columns(run))
     figure = style.empty_figure(15.0, 9.2 + 2.9 * (rows - 3))
     told_below = [failure(run), noted(notes(run.scene))]
-    below = [line for words in told_below for line in textwrap.wrap(words, _LINE_LETTERS - 30)] + event_lines(run)
+    below = [line for words in told_below for line in style.wrapped(words, _LINE_LETTERS - 30)] + event_lines(run)
     heights = 0.085, 1.0, 0.001 + 0.025 * len(below)
     header, body, footer = figure.subfigures(3, 1, squeeze=False, height_ratios=heights)[:, 0]
     grid = body.add_gridspec(rows, 3, width_ratios=(1.9, 1.25, 1.15))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +46,11 @@ def verdict_colour(summary: Summary | None) -> str:
         return GREY
     has_proviso = summary["verdict"] == "steady" and summary.get("stability", {}).get("provisos")
     return _PROVISO if has_proviso else VERDICTS.get(told(summary), GREY)
+
+
+def wrapped(words: str, letters: int, **how: Any) -> list[str]:
+    """Returns text in lines of so many letters, none of which begins with a per cent sign; ``how`` as for textwrap."""
+    return textwrap.wrap(words.replace(" %", "\u00a0%"), letters, **how)
 
 
 def element_colour(number: int) -> str:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from textwrap import fill
 from typing import TYPE_CHECKING
 
-from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, empty_figure, fit_text
+from haploop.tools.figure.style import GREY, INK, LARGE, SMALL, TEXT, empty_figure, fit_text, wrapped
 from haploop.tools.sweep.map.looks import amplitude_colours, metres_along
 
 if TYPE_CHECKING:
@@ -95,7 +94,8 @@ class Column:
     def notes(self, sentences: Sequence[str]) -> None:
         """Writes sentences, a paragraph each, the first darker than the others."""
         for number, sentence in enumerate(sentences):
-            self._write(fill(sentence, _LETTERS, break_on_hyphens=False), SMALL, GREY if number else INK)
+            lines = wrapped(sentence, _LETTERS, break_on_hyphens=False)
+            self._write("\n".join(lines), SMALL, GREY if number else INK)
 
     def _write(self, words: str, size: float, colour: str) -> None:
         look = {"fontsize": size, "color": colour, "transform": self._ax.transAxes, "gid": "legend"}
