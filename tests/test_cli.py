@@ -109,6 +109,14 @@ def test_an_element_that_takes_the_name_of_an_installed_one_is_noted_where_it_is
     assert json.loads(run.stdout)["notes"] == [note]
 
 
+def test_check_refuses_an_element_that_run_refuses(tmp_path):
+    plugin = tmp_path / "brake.py"
+    plugin.write_text(BRAKE.replace("return where(", 'raise ValueError("oh dear")\n        return where('))
+    done = haploop("check", FIG6C, "--set", "dissipation.0.kind=brake", "--plugin", str(plugin))
+    assert done.exit_code == 2
+    assert "gave no force when it was tried at rest: ValueError: oh dear" in done.stderr
+
+
 def test_a_parameter_in_what_is_no_unit_is_refused_where_elements_are_listed_as_where_they_run(tmp_path):
     plugin = tmp_path / "brake.py"
     plugin.write_text(BRAKE.replace('"N"', '"N q/m"'), encoding="utf-8")

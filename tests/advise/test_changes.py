@@ -205,7 +205,7 @@ def test_the_line_of_the_scene_that_breaks_says_on_which_wall_that_is() -> None:
         told: Any = SimpleNamespace(breaks=scene, found=SimpleNamespace(breaks=broken))
         return breaks_words(told)
 
-    stiffer = ": the case that breaks first, with a wall of 0.67 N/mm, the softest tried whose run is said to swing"
+    stiffer = ": the case that breaks first, with a wall of 0.67 N/mm, on which the swing is plainer"
     assert words(665.0, "pushed").startswith(stiffer)
     assert words(390.0, "pushed") == ": the case that breaks first, with a wall of 0.39 N/mm"
     assert "to the end of the quarter second" in words(390.0, "window")
@@ -219,7 +219,8 @@ def test_the_stages_of_an_advice_are_told_by_their_place_among_all() -> None:
 def test_a_frequency_is_told_of_a_line_alone_and_both_senses_where_both_feel_it() -> None:
     spikes = Failure("hold x 1", 1.0, False, 22e-6, 0.7, 12.0, 2.0, True, None, 0.5, False, 6, 0.25)
     assert describe(spikes) == (
-        "700 mN and 22 µm peak to peak at no single frequency, turning 6 times in 0.25 s, felt as force; hold x 1"
+        "700 mN commanded and 22 µm peak to peak at no single frequency, turning 6 times in 0.25 s, felt as force; "
+        "hold x 1"
     )
     wide = Failure("hold x 1", 1.0, False, 5.4e-3, 11.0, 30.0, 200.0, True, None, 90.0, True, 15, 0.25)
     assert "at 30 Hz, felt as force and as motion; " in describe(wide)

@@ -42,6 +42,21 @@ def change_summary(directory: Path, change: Callable[[dict], object]) -> None:
     path.write_text(json.dumps(summary))
 
 
+def test_a_long_run_that_was_not_judged_is_repeated_without_comparing_its_verdict(tmp_path, monkeypatch):
+    """Every healthy run of processes of more than 60 s was said to differ."""
+    run(prepare(FIG6C, ["duration=0.3"], out=tmp_path / "run"), in_process=True)
+    monkeypatch.setattr("haploop.launch.runs.replay.REPEATED_S", 0.2)
+    assert replay(tmp_path / "run").differences == []
+    path = tmp_path / "run/summary.json"
+    summary = json.loads(path.read_text())
+    del summary["stability"], summary["checksum"]
+    path.write_text(json.dumps({**summary, "verdict": "swinging"}))
+    assert replay(tmp_path / "run").differences == []
+    monkeypatch.setattr("haploop.launch.runs.replay.REPEATED_S", 60.0)
+    told = replay(tmp_path / "run").differences
+    assert told == ["verdict of the summary differs.", "stability of the summary differs."]
+
+
 def test_a_number_changed_in_the_summary_is_refused_by_its_checksum(directory):
     change_summary(directory, lambda summary: summary["window"].update(oscillation_m=1.0))
     for reader in (recorded_summary, replay, RunData.from_directory):

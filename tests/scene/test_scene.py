@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from haploop.controller.dissipation import Element, Quantity
+from haploop.launch.runs.loaded_scene import load as loaded_in_python
 from haploop.launch.scene.check import resolve
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.scene.reading.layers import Layers
@@ -159,6 +160,12 @@ def test_the_mistake_carries_its_parts():
 def test_a_trace_whose_samples_are_no_function_of_time_is_refused(samples):
     [mistake] = mistakes(hand={"force": {"kind": "trace", "time": samples[0], "force": samples[1]}})
     assert mistake.startswith("hand.force does not fit together. Sample ")
+
+
+def test_samples_given_in_python_that_do_not_fit_together_are_told_as_values_not_as_the_file_they_replace():
+    trace = {"kind": "trace", "time": [0.0, 1.0, 0.5], "force": [0.0, 0.0, 0.0]}
+    with pytest.raises(SceneError, match=r"^values: hand\.force does not fit together\. Sample 2:"):
+        loaded_in_python("demo", {"hand.force": trace})
 
 
 def test_a_plugin_brings_its_own_parameters_units_and_defaults():

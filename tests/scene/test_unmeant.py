@@ -239,7 +239,7 @@ REPAIRS = {
     "duration = 2 ms": 'A number with its unit must be text in quotes: "2 ms".',
     'duration = "0,3 s"': 'Write decimals with a point, not a comma: "0.3 s".',
     "duration = 1.0\n[dissipation]\nkind='damping'": "It must be a list of tables: [[dissipation]], two",
-    "": "haploop advise my.toml takes it as it is",
+    "": "my.toml takes it as it is",
 }
 
 
@@ -249,6 +249,13 @@ def test_a_mistake_of_form_is_told_with_its_repair(tmp_path, head, words):
     file.write_text(f"{head}\n[device]\nmass = 0.05\ndamping = 0.0\n")
     with pytest.raises(SceneError, match=re.escape(words)):
         load(file)
+
+
+def test_a_device_of_haploops_own_is_called_by_the_name_that_advise_and_extends_know():
+    with pytest.raises(SceneError) as refused:
+        load(Path("devices/premium15"))
+    assert "haploop advise premium15 takes it as it is" in str(refused.value)
+    assert 'extends = ["devices/premium15"].' in str(refused.value)
 
 
 @pytest.mark.parametrize(("friction_N", "moves"), [(9.9, True), (10.0, False)])

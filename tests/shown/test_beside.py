@@ -160,7 +160,9 @@ def test_diff_tells_it_as_a_table_and_as_one_json_object(runs):
     heads = told.stdout.split("\n", 2)[1].split()
     assert heads == ["a", "swapped"], "the directories tell the runs apart"
     rows = [line.split("  ")[0].strip() for line in told.stdout.splitlines()]
-    assert {"force, peak to peak", "pushed, it swings by", "wall and elements together"} <= {*map(str.strip, rows)}
+    assert {"commanded force, peak to peak", "pushed, it swings by", "wall and elements together"} <= {
+        *map(str.strip, rows)
+    }
     assert "[swapped]" in told.stdout, "brackets are no markup"
     assert re.search(r"event.0.at +– +1 s", told.stdout)
     assert re.search(r"event.0.set.wall.stiffness +– +90", told.stdout)

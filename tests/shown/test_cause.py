@@ -84,6 +84,17 @@ def test_the_part_without_which_a_loop_rests_is_its_likely_cause_with_every_tria
     assert cause(swap["energy"], "According to the books of the whole run") in text
 
 
+def test_a_loop_that_was_not_tried_without_its_parts_is_said_not_to_have_been(swap: dict[str, Any]) -> None:
+    def text(verdict: str, stability: dict[str, Any]) -> str:
+        return " ".join(shown(summary_table({**swap, "verdict": verdict, "stability": stability})).split())
+
+    untried = swap["stability"] | {"without": None}
+    assert "No part is named: none was tried, or the loop, started anew" in text("limit-cycle", untried)
+    assert "No part is named" not in text("steady", untried)
+    assert "No part is named" not in text("limit-cycle", untried | {"without": {"delay": "rests"}})
+    assert "No part is named" not in text("swinging", {})
+
+
 def energy(*elements: tuple[str, float], **leak: float) -> dict[str, Any]:
     causes = dict.fromkeys(("delay_J", "sampling_and_hold_J", "quantisation_J"), 0.0) | leak
     booked = [{"kind": kind, "true_J": true_J} for kind, true_J in elements]

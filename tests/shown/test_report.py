@@ -17,7 +17,7 @@ from haploop.launch.runs.start import prepare, run
 from haploop.protocol.quantity import Quantity
 from haploop.tools.render.listings import plugins_table, status_table
 from haploop.tools.render.progress import ProgressLine
-from haploop.tools.render.report import summary_table
+from haploop.tools.render.report import how_often, leak_rows, summary_table
 from haploop.tools.render.terminal import told
 from haploop.tools.render.units import amount, fixed
 from helpers.shown import row, shown
@@ -38,7 +38,7 @@ def test_the_summary_table_holds_every_book_and_the_residual(swap: dict[str, Any
     assert row(text, "unidirectional-inertia (mass 0.01)") == ["1.5–3 s", *books]
     window = swap["window"]
     swing, ripple = (amount(window[key], "N") for key in ("force_swing_N", "force_ripple_N"))
-    assert row(text, "force  ") == [f"{swing} peak to peak at its end"]
+    assert row(text, "commanded force") == [f"{swing} peak to peak at its end"]
     assert f"{ripple} peak to peak, above 30 Hz only" in " ".join(text.split())
     assert row(text, "leak by delay") == [amount(energy["wall"]["leak"]["delay_J"], "J")]
     assert row(text, "work of the hand") == [amount(energy["hand_work_J"], "J")]
@@ -46,6 +46,33 @@ def test_the_summary_table_holds_every_book_and_the_residual(swap: dict[str, Any
     share = f"residual, {energy['residual_J'] / energy['moved_J']:.1e} of what moved"
     assert row(text, share) == [amount(energy["residual_J"], "J")]
     assert max(map(len, text.splitlines())) <= width
+
+
+@pytest.mark.parametrize(
+    ("crossed_Hz", "pushed_Hz", "told"),
+    [
+        (30.0, 30.2, ", at about 30 Hz"),
+        (9.0, 9.37, ", at about 9 Hz"),
+        (20.0, 9.37, ", through its mean 40 times a second"),
+        (20.0, None, ", at about 20 Hz"),
+        (None, 9.37, ""),
+    ],
+)
+def test_crossings_are_told_as_a_frequency_only_where_they_are_that_of_the_pushed_loop(
+    crossed_Hz: float | None, pushed_Hz: float | None, told: str
+) -> None:
+    """A swing of 2.34 mm at 9.4 Hz that bounced on its wall was said to be at about 20 Hz."""
+    assert how_often({"window": {"frequency_Hz": crossed_Hz}, "stability": {"frequency_Hz": pushed_Hz}}) == told
+
+
+def test_changes_of_the_wall_have_a_row_so_that_the_rows_of_the_wall_sum_to_it(tmp_path: Path) -> None:
+    softer = "event=[{at=0.4, set={'wall.stiffness'=900.0}}]"
+    of = run(prepare(SCENES / "premium_press.toml", ["duration=0.6", softer], out=tmp_path / "o"), in_process=True)
+    wall = of["energy"]["wall"]
+    rows = leak_rows(wall)
+    assert rows["changes of the wall in contact"] == -wall["changes_J"] != 0.0
+    assert sum(filter(None, rows.values())) == pytest.approx(wall["true_J"], rel=1e-9)
+    assert "changes of the wall in contact" in shown(summary_table(of))
 
 
 def test_the_report_ends_with_the_verdict_and_the_first_of_the_notes_and_without_notes_with_its_books(
@@ -179,7 +206,7 @@ def test_the_status_table_tells_of_every_node_its_tick_its_lag_whom_it_waits_for
     }  # fmt: skip
     text = shown(status_table(data), width)
     assert "paused  1.2 s of 3 s, tick 1200 of 3000, at pace 0.5" in text
-    assert "swinging so far, oscillation 1.23 mm" in text
+    assert "swinging in its last half second, oscillation 1.23 mm" in text
     assert row(text, "plant") == ["11", "1210", "–", "–", "–"]
     assert row(text, "controller") == ["11", "1209", "1 tick, 1.00 ms", "–", "–"]
     assert row(text, "logger") == ["11", "1200", "10 ticks, 10.0 ms", "plant", "–"]

@@ -54,6 +54,18 @@ def test_a_wall_is_steady_that_a_blow_takes_the_device_off_where_friction_keeps_
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("watched_s", "needs_s", "told"), [
+    (16.0, 1e5, "haploop judge, which watches for up to 64 s, might show it"),
+    (16.0, 40.0, "haploop judge, which watches for up to 64 s, might show it"),
+    (64.0, 200.0, "watching for about 200 s might show it"),
+    (64.0, 1e5, "a much longer run might show it"),
+])  # fmt: skip
+def test_an_undecided_loop_is_told_what_may_tell_more(watched_s, needs_s, told):
+    """Of a loop that haploop judge decided in 32 s it was said that no run of less than an hour might show it."""
+    of = Finding("undecided", "too slow", width_m=1e-3, frequency_Hz=50.0, watched_s=watched_s, needs_s=needs_s)
+    assert told in of.sentence()
+
+
 def test_the_settling_time_is_that_of_the_second_order_loop():
     """x decays as e^(-rate t): 5 % are passed at ln(20) / rate, but for half a period (b = 3 N s/m of the device)."""
     tables = pressed(device={"mass": 0.5, "damping": 3.0}, wall={"position": 0.0, "stiffness": 300.0})

@@ -18,7 +18,7 @@ from haploop.launch.runs.run_files import holds_readings, recorded_log, recorded
 from haploop.launch.spec import PLUGINS, SCENE, RunFailed, kept_name
 from haploop.logger.log import LogError
 from haploop.logger.log.recording import Recording
-from haploop.logger.summary import Summary, finite
+from haploop.logger.summary import REPEATED_S, Summary, finite
 from haploop.protocol.changes import Event
 from haploop.protocol.files import read_file
 from haploop.protocol.scene.scene import Scene, accelerometer_is_used
@@ -85,7 +85,7 @@ def replay(directory: Path) -> Replay:
     failed = before is not None and before["ended"] == "failed"
     differences = _compare_scenes(directory, recorded) + _compare(recorded, repeated, failed)
     if before and not failed:
-        differences += _compare_summaries(before, finite(summary))
+        differences += _compare_summaries(before, finite(summary), scene)
     return Replay(summary, differences, recorded.cut)
 
 
@@ -228,7 +228,9 @@ def _compare(recorded: Mapping[str, Any], repeated: Mapping[str, Any], failed: b
     return differences
 
 
-def _compare_summaries(before: Summary, after: Summary) -> list[str]:
-    keys = ("ticks", "verdict", "stability", "trajectory_sha256", "final", "extremes", "window", "energy", "lost")
-    of_effects = ("actuator", "accelerometer")
-    return [f"{key} of the summary differs." for key in (*keys, *of_effects) if before.get(key) != after.get(key)]
+def _compare_summaries(before: Summary, after: Summary, scene: Scene) -> list[str]:
+    keys = ("ticks", "trajectory_sha256", "final", "extremes", "window", "energy", "lost", "actuator", "accelerometer")
+    # A run of processes longer than REPEATED_S was not judged; the repetition is.
+    was_judged = "stability" in before or scene.run.verdict != "pushed" or before["duration_s"] <= REPEATED_S
+    of_verdict = ("verdict", "stability") if was_judged else ()
+    return [f"{key} of the summary differs." for key in (*keys, *of_verdict) if before.get(key) != after.get(key)]

@@ -46,14 +46,24 @@ def prepare(
         ElementError: an element's own code does not take the parameters it is given.
         OutputError: the directory cannot be used.
     """
-    if plugins:
-        scene, kinds, sources = _with_plugins(scene_path, overrides, plugins, any_hand)
-    else:
-        kinds, sources = registry(), {}
-        scene = load(scene_path, overrides, kinds, any_hand=any_hand)
-        try_out(elements_of(scene), kinds)
+    scene, kinds, sources = load_tried(scene_path, overrides, plugins, any_hand)
     is_new = out is None or not out.exists()
     return lay_out(scene, kinds, make_output(out, scene_path), plugins, sources, is_new)
+
+
+def load_tried(
+    scene_path: Path, overrides: Sequence[str], plugins: Sequence[Path], any_hand: bool
+) -> tuple[Scene, dict[str, type[Element]], dict[str, Path]]:
+    """Returns what ``prepare`` reads: the scene, every kind by name, and the file of each that has one, all tried.
+
+    Raises SceneError, PluginError or ElementError as ``prepare`` does.
+    """
+    if plugins:
+        return _with_plugins(scene_path, overrides, plugins, any_hand)
+    kinds = registry()
+    scene = load(scene_path, overrides, kinds, any_hand=any_hand)
+    try_out(elements_of(scene), kinds)
+    return scene, kinds, {}
 
 
 def _with_plugins(

@@ -13,9 +13,10 @@ from pydantic_core import PydanticCustomError
 
 from haploop.launch.plan.effect import Draft
 from haploop.launch.plan.effects import all_effects
+from haploop.launch.scene.bundled import bundled
 from haploop.launch.scene.estimator_keys import check_estimators, check_filter
 from haploop.launch.scene.events import check_events
-from haploop.launch.scene.mistakes import Mistake, SceneError
+from haploop.launch.scene.mistakes import COMMAND_LINE, Mistake, SceneError, shown
 from haploop.launch.scene.models import Model, number_of, read_table, scene_model
 from haploop.launch.scene.reading.layers import KeyPath, Layers
 from haploop.launch.scene.schema import Schema, alternatives, keys_of_all, schema_at, whole_schema
@@ -205,8 +206,13 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
             if what == "union_tag_invalid":
                 _complain_of_keys(layers, key[:-1], schema, rule)
         case "sentence":
-            given = "does not fit together" if isinstance(layers.value(key), dict) else None
-            layers.complain(key, message, given)
+            table = layers.value(key)
+            given = "does not fit together" if isinstance(table, dict) else None
+            # Of a table that a file began, what was laid over it last is what does not fit.
+            inner = [(*key, name) for name in table] if given else []
+            layers.complain(
+                key, message, given, place=next((at for at in inner if layers.origin(at) == COMMAND_LINE), key)
+            )
         case "list_type" if isinstance(layers.value(key), dict):
             layers.complain(key, f"It must be a list of tables: [[{key[-1]}]], two pairs of brackets.", "is one table")
         case "model_type" | "model_attributes_type" | "dict_type" if _is_list_of_tables(layers.value(key)):
@@ -244,10 +250,11 @@ def _of_a_device(layers: Layers, key: KeyPath) -> str:
     """Returns what to do with a file that describes a device and no task; "" for any other file."""
     if key != ("duration",) or not layers.data.keys().isdisjoint({"wall", "hand", "dissipation"}):
         return ""
-    name = Path(layers.path).name
+    own = next((name for name, path in bundled("devices").items() if path == Path(layers.path)), None)
+    name, place = (own, f"devices/{own}") if own else (shown(layers.path),) * 2
     return (
         f" A file with only a device is not a scene: haploop advise {name} takes it as it is, and a scene includes it "
-        f'with extends = ["{name}"].'
+        f'with extends = ["{place}"].'
     )
 
 

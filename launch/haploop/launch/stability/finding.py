@@ -8,7 +8,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from haploop.launch.stability.swing import REST_M
-from haploop.launch.stability.why import AFTER_BLOW, AT_HARDEST, DECAYING, DEEPER, FRICTIONLESS, GROWS, LASTS, WHY
+from haploop.launch.stability.why import (
+    AFTER_BLOW,
+    AT_HARDEST,
+    DECAYING,
+    DEEPER,
+    FRICTIONLESS,
+    GROWS,
+    JUDGE,
+    JUDGED_S,
+    LASTS,
+    WHY,
+)  # fmt: skip
 from haploop.logger.verdict.measures import WINDOW_S
 from haploop.protocol.filled import filled
 
@@ -220,7 +231,8 @@ class Finding:
         numbers = {name: math.nan if value is None else value for name, value in vars(self).items()}
         width_um, width = 1e6 * self.width_m, _in_words(self.width_m)
         about_s = float(f"{numbers['needs_s']:.2g}")
-        run = f"watching for about {about_s:.0f} s" if about_s <= _LONGEST_S else "no run of less than an hour"
+        longer = f"watching for about {about_s:.0f} s" if about_s <= _LONGEST_S else "a much longer run"
+        run = JUDGE if self.watched_s < JUDGED_S else longer
         sentence = filled(WHY[self.why], **numbers, width=width, width_um=width_um, run=run, decaying=self._decaying())
         sentence += filled(AFTER_BLOW[self.blown], **numbers) if self.blown else ""
         sentence += filled(AT_HARDEST[self.at_hardest], **numbers) if self.at_hardest else ""

@@ -32,6 +32,8 @@ WHY = {
     "{rate_1_s:.2g} +- {error_1_s:.2g} 1/s: too slowly, or too differently from the other, to be judged within "
     "{watched_s:g} s; {run} might show it.",
 }
+# What may tell more of a loop that was watched for less than ``haploop judge`` watches.
+JUDGED_S, JUDGE = 64.0, "haploop judge, which watches for up to 64 s,"
 DECAYING = ", and still decaying by {0:.3g} +- {1:.2g} 1/s"
 # What is said in addition after a blow, and about the loop without its friction.
 AFTER_BLOW = {

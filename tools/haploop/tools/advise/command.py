@@ -29,7 +29,7 @@ from haploop.tools.render.terminal import console
 from haploop.tools.render.units import format_stiffness
 
 ADVICE, FIGURE, WALLS, _ASKED = "advice.json", "figure.png", "walls.jsonl", "asked.toml"
-_STIFFER = ", the softest tried whose run is said to swing; the swing is felt from {0} on"
+_STIFFER = ", on which the swing is plainer; it is felt from {0} on"
 _SCENE, _BREAKS = "advice.toml", "advice_breaks.toml"
 
 

@@ -194,7 +194,7 @@ def describe(failure: Failure) -> str:
     if not failure.frequency_Hz:
         return failure.case
     felt = _FELT[failure.by_force] if failure.other_felt < 1.0 else _FELT_BOTH
-    swing = f"{amount(failure.force_N, 'N', 2)} and {amount(failure.motion_m, 'm', 2)} peak to peak"
+    swing = f"{amount(failure.force_N, 'N', 2)} commanded and {amount(failure.motion_m, 'm', 2)} peak to peak"
     words = _AT if failure.is_line else _TURNS
     when = words.format(hz=failure.frequency_Hz, turns=failure.turns, within=failure.within_s)
     return f"{swing} {when}, felt as {felt}; {failure.case}"

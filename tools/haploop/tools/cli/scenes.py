@@ -50,21 +50,20 @@ def check(
 ) -> None:
     """Report what is wrong or probably unintended in a scene."""
     from haploop.launch.plan.effects import notes
-    from haploop.launch.scene.file import load
+    from haploop.launch.runs.start import load_tried
     from haploop.launch.scene.mistakes import SceneError
     from haploop.launch.scene.schema import json_schema
     from haploop.launch.scene.toml_writer import to_toml
     from haploop.protocol.scene.scene import hand_is_unmodelled
 
     with plain_errors():
-        kinds = kinds_with(plugin or [])
         if schema:
-            print(dumps(json_schema(kinds), indent=2))
+            print(dumps(json_schema(kinds_with(plugin or [])), indent=2))
             return
         if scene is None:
             raise typer.BadParameter("A scene file was expected, or --schema.")
         try:
-            resolved = load(scene, set or [], kinds, any_hand=True)
+            resolved, kinds, _ = load_tried(scene, set or [], plugin or [], any_hand=True)
         except SceneError as error:
             if json:
                 print_json({"mistakes": [str(mistake) for mistake in error.mistakes]})

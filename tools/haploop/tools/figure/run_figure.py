@@ -132,7 +132,7 @@ def key_numbers(run: RunData) -> list[str]:
     when = f"in the last {last - from_s:.3g} s" if is_end else f"from {from_s:.3g} to {to_s:.3g} s"
     words = [f"{when}: oscillation {amount(window['oscillation_m'], 'm')}"]
     if (swing_N := window.get("force_swing_N")) is not None:
-        words[0] += f", force {amount(swing_N, 'N')} peak to peak"
+        words[0] += f", commanded force {amount(swing_N, 'N')} peak to peak"
     found = run.summary.get("stability", {})
     words[:0] = [", ".join(found["provisos"])] if found.get("provisos") else []
     if found.get("rate_1_s") is not None:

@@ -52,6 +52,9 @@ _LIKELY = "Likely cause: {}"
 _PRESSED_THROUGH = (
     "the hand, which presses harder than the wall answers within the device's limit, or than the actuator can."
 )
+_NO_TRIALS = (
+    "No part is named: none was tried, or the loop, started anew on the wall and pushed, does not swing as here."
+)
 _SMALL_SHARE = "of the {:.0%} of the oscillation that the loop sustains alone, "
 _TRIED = "{cause}. Started anew on the wall, pushed, and struck where it rests, the loop {trials}."
 _BY_BOOKS = "According to the books of the whole run"
@@ -81,7 +84,9 @@ def likely_cause(summary: Summary) -> str:
         is_of_this_loop = summary["window"].get("changed_s") is None and energy["wall"].get("true_J") != 0.0
         fed = is_of_this_loop and _most_fed_J(energy) > 0.0
         return " ".join([_LIKELY.format(tried), *([cause(energy, _BY_BOOKS)] if fed else [])]).strip()
-    return "" if 0.0 < _most_fed_J(energy) < _TELLING * (energy.get("moved_J") or 0.0) else cause(energy)
+    hardly_fed = 0.0 < _most_fed_J(energy) < _TELLING * (energy.get("moved_J") or 0.0)
+    untried = _NO_TRIALS if summary["verdict"] != "swinging" and stability and not without else ""
+    return " ".join(filter(None, ["" if hardly_fed else cause(energy), untried]))
 
 
 def _most_fed_J(energy: Summary) -> float:

@@ -34,7 +34,8 @@ def status_table(data: Message) -> RenderableType:
     parts: list[RenderableType] = [head, Text.assemble(state, where)]
     if status := data.get("status"):
         word = "settling" if status["verdict"] == "undecided" else seen(status["verdict"])
-        looks = f"{' so far' * (word != 'settling')}, oscillation {amount(status['oscillation_m'], 'm')} peak to peak"
+        when = "" if word == "settling" else " in its last half second"
+        looks = f"{when}, oscillation {amount(status['oscillation_m'], 'm')} peak to peak"
         parts.append(Text.assemble((word, verdict_style(word)), looks))
     parts += [Text(f"{words} {late}") for words, late in lateness_rows(data)]
     parts += [Text(reason, "yellow") for reason in data.get("refused", {}).values()]

@@ -22,13 +22,16 @@ if TYPE_CHECKING:
     from haploop.protocol.transport.wire import Message
 
 _ITS_WORD = "Only the {} itself says that it does what the scene says; haploop replay checks it against the scene."
-_TRIED = "a hold of {}, pushed by up to {}; haploop advise tries taps, other holds and devices"
+_TRIED = "with the hand's force of {}, pushed by up to {}; haploop advise tries taps, other holds and devices"
+# Frequencies that differ by no more than this share, or by this much, which is how finely crossings tell them, are one.
+_ALIKE, _COARSE_HZ = 0.15, 1.5
+_AT, _CROSSED = ", at about {0} Hz", ", through its mean {1} times a second"
 _NOTE = "A note on its scene: {first}"
 _NOTES = "{count} notes on its scene; the first: {first}"
 # Entries of the summary's window, their words, and what stands after the number. Peaks of two swings do not add.
 _OF_FORCE = {
-    "force_swing_N": ("force", " peak to peak at its end"),
-    "force_ripple_N": ("force ripple", " peak to peak, above 30 Hz only"),
+    "force_swing_N": ("commanded force", " peak to peak at its end"),
+    "force_ripple_N": ("its ripple", " peak to peak, above 30 Hz only"),
 }
 # Entry of the summary, the count in it, and its words.
 _COUNTS = (
@@ -38,7 +41,10 @@ _COUNTS = (
     ("actuator", "saturated_commands", "commands saturated"),
     ("accelerometer", "clipped_ticks", "readings clipped"),
 )
+# Verdicts of a loop whose force over depth is a stiffness.
+_RESTS = ("steady", "no-swing-seen")
 # The causes of a wall's leak by their keys in the summary.
+_CHANGED = "changes of the wall in contact"
 HELD, LAW_TAKES = "stored by an ideal wall at the end", "taken by its law"
 # The damping of a wall acts on the estimated velocity.
 _OF_DAMPING = {"quantisation_J": "quantisation and estimates"}
@@ -53,9 +59,22 @@ def plant_books(energy: Summary) -> dict[str, str]:
     return {key: name for key, name in words.items() if key in energy}
 
 
+def how_often(summary: Summary) -> str:
+    """Returns how often a swing went to and fro at its end; "" where it did not.
+
+    That is its frequency unless it crosses its mean more often than once in half a period, as what bounces on a wall
+    does: then the frequency of the pushed loop is another.
+    """
+    if not (crossed_Hz := summary["window"].get("frequency_Hz")):
+        return ""
+    pushed_Hz = summary.get("stability", {}).get("frequency_Hz") or crossed_Hz
+    is_plain = abs(crossed_Hz - pushed_Hz) <= max(_ALIKE * pushed_Hz, _COARSE_HZ)
+    return (_AT if is_plain else _CROSSED).format(fixed(crossed_Hz, 0), fixed(2.0 * crossed_Hz, 0))
+
+
 def displayed_stiffness(summary: Summary) -> float | None:
-    """Returns the displayed stiffness, N/m; None where the loop swings, whose mean force over depth is no stiffness."""
-    return None if summary["verdict"] in SWINGS else summary["window"]["displayed_stiffness_N_m"]
+    """Returns the displayed stiffness, N/m; None where the loop may swing, whose mean force over depth is none."""
+    return summary["window"]["displayed_stiffness_N_m"] if summary["verdict"] in _RESTS else None
 
 
 def count_losses(summary: Summary) -> dict[str, int]:
@@ -113,7 +132,7 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
     ran = f"{summary['duration_s']:g} s, {counted(summary['ticks'], 'tick')}"
     if summary["wall_s"]:
         ran += f", in {amount(summary['wall_s'], 's')} ({fixed(summary['real_time_factor'])} times real time)"
-    at_Hz = f", at about {fixed(hertz, 0)} Hz" if (hertz := window.get("frequency_Hz")) else ""
+    at_Hz = how_often(summary)
     figures = [
         ("ran", ran),
         *lateness_rows(summary),
@@ -170,6 +189,7 @@ def leak_rows(wall: Summary) -> dict[str, float | None]:
     causes = LEAK_CAUSES | (_OF_DAMPING if "dissipated_J" in wall else {})
     rows = {f"leak by {words}": wall["leak"][key] for key, words in causes.items()}
     rows |= {LAW_TAKES: wall["dissipated_J"]} if "dissipated_J" in wall else {}
+    rows |= {_CHANGED: -wall["changes_J"]} if wall.get("changes_J") else {}
     # The rounding error of a much larger number is zero.
     ideal_J, true_J = wall["ideal_J"], wall["true_J"]
     is_zero = None not in (ideal_J, true_J) and abs(ideal_J) <= 1e-9 * abs(true_J)

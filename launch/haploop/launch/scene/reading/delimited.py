@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from haploop.launch.scene.units import is_number, is_unit, name_and_unit
+from haploop.launch.scene.units import has_dimension, is_number, is_unit, name_and_unit
 from haploop.protocol.files import demand_regular
 from haploop.protocol.names import nearest
 
@@ -109,6 +109,11 @@ class DelimitedFile:
     def find(self, names: Sequence[str]) -> Column | None:
         """Returns the first column that has one of these names in any case; None if there is none."""
         return next(iter(self.all_of(names)), None)
+
+    def in_unit(self, unit: str) -> Column | None:
+        """Returns the only column in a unit of the dimension of this one; None if there is none, or another."""
+        found = [column for column in self.columns if has_dimension(column.unit, unit)]
+        return found[0] if len(found) == 1 else None
 
     def all_of(self, names: Sequence[str]) -> list[Column]:
         """Returns the columns that have one of these names, in any case and with or without ``_unit``, in order."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from haploop.launch.scene.models import fault
 from haploop.launch.scene.reading.delimited import Column, DelimitedFile, RecordingError
-from haploop.launch.scene.units import has_dimension, scale_of
+from haploop.launch.scene.units import scale_of
 from haploop.protocol.files import MOST_BYTES, demand_regular
 
 # Names by which a column is known.
@@ -50,12 +50,10 @@ def read_trace(path: Path, time: str | None = None, force: str | None = None) ->
 def _column(file: DelimitedFile, given: str | None, what: str, names: Sequence[str], unit: str) -> Column:
     if given is not None:
         return file.column(given, what)
-    in_unit = [column for column in file.columns if has_dimension(column.unit, unit)]
-    place = 0 if what == "time" else 1
-    if found := file.find(names) or (in_unit[0] if len(in_unit) == 1 else None):
+    if found := file.find(names) or file.in_unit(unit):
         return found
     if len(file.columns) == 2:
-        return file.columns[place]
+        return file.columns[0 if what == "time" else 1]
     raise RecordingError(_WHICH.format(path=file.path, what=what, names=_names(file)))
 
 

@@ -102,9 +102,9 @@ class TextRecording:
         }
         columns = {what: file.column(name, what) for what, (name, *_) in asked.items() if name is not None}
         if "position" not in columns:
-            columns["position"] = self._guessed(file, _POSITIONS, "position")
+            columns["position"] = self._guessed(file, _POSITIONS, "position", "m")
         if layout.rate_Hz is None and "time" not in columns:
-            columns["time"] = self._guessed(file, _TIMES, "time")
+            columns["time"] = self._guessed(file, _TIMES, "time", "s")
         if layout.rate_Hz is not None and "time" in columns:
             raise RecordingError("Give either the column of the time or the rate, not both.")
         scales = {}
@@ -128,15 +128,15 @@ class TextRecording:
         return columns, scales
 
     @staticmethod
-    def _guessed(file: DelimitedFile, names: tuple[str, ...], what: str) -> Column:
+    def _guessed(file: DelimitedFile, names: tuple[str, ...], what: str, unit: str) -> Column:
         found = file.all_of(names)
         if what == "position" and len(found) > 1:
             numbers = ", ".join(f"{column.name} ({column.index + 1})" for column in found)
             raise RecordingError(
                 f"Which column of {file.path} is the position, {numbers}? Give its number with --position."
             )
-        if found:
-            return found[0]
+        if column := found[0] if found else file.in_unit(unit):
+            return column
         there = ", ".join(column.name for column in file.columns)
         instead = " or --rate" if what == "time" else ""
         raise RecordingError(

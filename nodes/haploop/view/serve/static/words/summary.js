@@ -86,6 +86,7 @@ function books({ wall = {}, elements = [], actuator_J: kept, moved_J: moved, res
     if (wall.leak) rows.push([`leak by ${words}${estimates}`, undefined, wall.leak[key]]);
   }
   if (isNumber(wall.dissipated_J)) rows.push(["taken by the law of the wall", undefined, wall.dissipated_J]);
+  if (wall.changes_J) rows.push(["changes of the wall in contact", undefined, -wall.changes_J]);
   for (const { kind, from_tick: from, to_tick: to, sampled_J, true_J } of elements) {
     rows.push([`${kind}, ticks ${from} to ${to}`, sampled_J, true_J]);
   }
