@@ -88,7 +88,7 @@ def _swap(layers: Layers, key: KeyPath, event: Tables, slots: list[Any]) -> None
         expected = (
             f"The scene has {counted(len(slots), 'element')} at that time, counted from 0; one past the end adds one."
         )
-        layers.complain((*key, "element"), expected, f"is {element}")
+        layers.complain((*key, "element"), expected, f"is {element}" + " by default" * ("element" not in event))
 
 
 def settable_keys(

@@ -39,7 +39,7 @@ class Number:
         except OverflowError:
             _refuse("It must be a number that a float can hold.")
         except ValueError as error:
-            _refuse(str(error))
+            _refuse(f"It must be {self.form}." if self.quantity.whole and not self.quantity.unit else str(error))
         if complaint:
             _refuse(f"It {complaint}.")
         if not self.quantity.whole:

@@ -47,8 +47,8 @@ class Figures(NamedTuple):
         from_s: when the window begins: half a second before the end, or half-way through a run shorter than that.
         oscillation_m: how far the true position moved in the window, peak to peak.
         growth_1_s: the r of e^(r t) by which the swings grow; negative: they decay; None where nothing swings.
-        frequency_Hz: half the number of crossings of the middle of the motion per second, to 1 Hz; None where nothing
-            swings.
+        frequency_Hz: half the number of crossings of the motion's straight trend per second, to 1 Hz; more than the
+            frequency of a swing that crosses it several times a period, as one that bounces; None where nothing swings.
         outside_fraction: share of the ticks of the window that are out of contact.
         displayed_stiffness_N_m: mean of total force over penetration at the ticks in contact (Choi et al. 2022, V.B.2),
             except those whose penetration is a rounding error of the wall's position; None without such ticks.

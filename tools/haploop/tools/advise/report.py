@@ -38,6 +38,7 @@ _HAND = "of {0} kg, {1} N s/m and {2} N/m{3}, each 20 % more or less; another ha
 _GRIP = ", holding through a grip of {0} N s/m and {1} N/m"
 _NO_HAND = "none, only its force: a hand may make this wall buzz (--hand)"
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
+_GRITTY = "; counts may be felt as grit"
 # What the run of the advised scene adds to "steady"; the search has tried the wall at every hold.
 _SOME_HOLDS = "tried at only some holds of its hand"
 _ADDS = "haploop run adds to its verdict on advice.toml: {0}"
@@ -80,11 +81,13 @@ def report(told: Advice) -> RenderableType:
 def answer(told: Advice) -> list[tuple[str, str]]:
     """Returns the lines that a builder reads first, each with its name."""
     found, best = told.found, told.found.advised
+    at_a_count, times_felt = describe_count(told)
     safe = _SAFE.format(format_stiffness(found.stiffness_N_m), best.family.phrase(best.values))
+    safe += _GRITTY if times_felt >= 1.0 else ""
     lines = [("at most" if told.is_ideal else "safe up to", safe if found.stiffness_N_m else _NO_WALL)]
     if found.stiffness_N_m and told.provisos:
         lines.append(("its run", describe_run(told.provisos)))
-    if at_a_count := describe_count(told):
+    if at_a_count:
         lines.append(("at a count", at_a_count))
     lines.append(("for a hand", describe_hand(told)))
     if found.stiffness_N_m:
@@ -159,16 +162,19 @@ def sentences(told: Advice) -> list[str]:
     return [told.headline, *(f"{name}: {words.rstrip('.')}." for name, words in answer(told))]
 
 
-def describe_count(told: Advice) -> str:
-    """Describes by how much the forces of the advised scene jump where a count is crossed; "" without an encoder."""
+def describe_count(told: Advice) -> tuple[str, float]:
+    """Describes by how much the forces of the advised scene jump where a count is crossed; "" without an encoder.
+
+    Returns also how many times what a hand feels a vibration of that force would be.
+    """
     if not told.scene or not (of := one_count(told.scene, installed_kinds())):
-        return ""
+        return "", 0.0
     kick_N = sum(of.elements_N)
     times = of.total_N / float(felt_force_N(told.scene)(np.array([_BEST_FELT_HZ]))[0])
     words = _STEP.format(amount(of.wall_N, "N")) + (
         _KICK.format(amount(kick_N, "N"), amount(of.total_N, "N")) if kick_N else ""
     )
-    return words + _GRIT.format(_BEST_FELT_HZ, fixed(times, 2))
+    return words + _GRIT.format(_BEST_FELT_HZ, fixed(times, 2)), times
 
 
 def describe_run(provisos: Sequence[str]) -> str:

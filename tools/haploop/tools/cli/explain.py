@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from haploop.tools.linear.terms import Limit, OneCount
     from haploop.tools.operations import Bill
 
+# From so many times a limit on, its share is told in times.
+_TIMES = 10.0
 _READING = (
     "A call into NumPy counts as one instruction. An entry's instructions are those that the loop would save "
     "without that entry alone; they are negative where something more expensive takes its place."
@@ -174,7 +176,8 @@ def _limits(scene: Scene, limits: list[Limit]) -> RenderableType:
             silent.setdefault(limit.why_not, []).append(limit.name)
             continue
         here = scene.wall.stiffness if scene.wall else 0.0
-        share = f"{fixed(100.0 * here / limit.stiffness_N_m)} % of it" if here and limit.stiffness_N_m else ""
+        times = here / limit.stiffness_N_m if here and limit.stiffness_N_m else 0.0
+        share = (f"{fixed(times)} times it" if times >= _TIMES else f"{fixed(100.0 * times)} % of it") if times else ""
         table.add_row(
             limit.name, limit.kind, spring(limit.stiffness_N_m), Text("; ".join(filter(None, [share, limit.why_not])))
         )

@@ -278,7 +278,9 @@ def _no_log(directory: Path) -> str:
     scene = recorded_scene(directory, {})
     if scene and scene.run.log == "none":
         return f'The run in {directory} was made with run.log = "none" and kept no log; run it again with "steps".'
-    return f"The directory {directory} holds no log.mcap; it is not the directory of a logged run."
+    drawn = directory / "figure.png"
+    there = f" {drawn} is there already." if drawn.exists() else ""
+    return f"The directory {directory} holds no log.mcap; it is not the directory of a logged run.{there}"
 
 
 def _as_happened(event: Event, rate: int) -> Event:
