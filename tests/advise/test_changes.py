@@ -145,10 +145,10 @@ def test_by_how_much_the_force_jumps_at_a_count_is_told_with_how_much_of_it_a_ha
     assert "changes by 10.0 mN and the element's force jumps by up to 550 mN and back" in line
     felt_N = float(felt_force_N(of)(np.array([100.0]))[0])
     assert line.endswith(f"at 100 Hz would be {fixed((0.4 + 2.0 * 0.15) / felt_N, 2)} times what a hand feels")
-    alone = dict(answer(replace(ADVICE, scene=replace(of, dissipation=()))))["at a count"]
-    assert alone.startswith(
-        "with each count of the encoder, the wall's force changes by 10.0 mN: in a slow press, grit"
-    )
+    assert told["safe up to"].endswith("less than a hand feels; counts may be felt as grit")
+    alone = dict(answer(replace(ADVICE, scene=replace(of, dissipation=()))))
+    assert "the wall's force changes by 10.0 mN: in a slow press, grit" in alone["at a count"]
+    assert alone["safe up to"].endswith("swinging by less than a hand feels"), "0.26 times what a hand feels"
     assert "at a count" not in dict(answer(replace(ADVICE, scene=replace(of, encoder=None))))
 
 
