@@ -269,6 +269,12 @@ def test_on_a_phone_what_steers_is_in_sight_wherever_one_reads_and_the_swap_one_
             expect(control).to_be_in_viewport(ratio=1)
     page.tap("#to-forms")
     expect(page.locator("#swap-do")).to_be_in_viewport()
+    expect(page.locator("#said")).not_to_be_in_viewport()
+    stand_in.answer = lambda command: (True, "element 0 becomes damping")
+    page.tap("#swap-do")
+    expect(page.locator("#said")).to_have_text("element 0 becomes damping")
+    expect(page.locator("#said")).to_be_in_viewport(ratio=1)
+    expect(page.locator("#pause")).to_be_in_viewport(ratio=1)
     assert "token" in page.url
 
 

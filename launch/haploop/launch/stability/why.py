@@ -18,7 +18,7 @@ WHY = {
     "{error_1_s:.2g} 1/s, and nothing in the loop makes small swings differ from large ones.",
     "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",
     "leaves the limit": "Held still and pushed, the device went beyond its limit.",
-    "failed": "The loop failed while it was watched: {detail}",
+    "failed": "The loop failed as its run was repeated, or while it was watched after it: {detail}",
     "rested": "After a push of {push_N:.3g} N it came to rest.",
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
     "rests off the wall": "After a push of {push_N:.3g} N it came to rest off the wall.",

@@ -37,6 +37,10 @@ export class Steering {
   }
 }
 
+// How long a result floats where the thumb is, on a narrow screen.
+const NEW_MS = 6000;
+let fades = null;
+
 /** Show the result of an order. */
 export function say({ ok, text, what = "Refused" }) {
   const said = byId("said");
@@ -45,4 +49,7 @@ export function say({ ok, text, what = "Refused" }) {
   // The page has a button for what the text says about going back in a terminal.
   const told = text.replace(/; to go back: .*$/m, "").replace(/([^.])\n/g, "$1. ");
   put(said, ok ? told : `${what}: ${text}`);
+  said.toggleAttribute("data-new", Boolean(text));
+  clearTimeout(fades);
+  fades = setTimeout(() => said.removeAttribute("data-new"), NEW_MS);
 }
