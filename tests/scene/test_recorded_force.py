@@ -20,7 +20,10 @@ def test_a_recorded_force_is_read_in_whole_relative_to_the_file_that_names_it(fi
     ("csv", "sentence"),
     [
         ("t,f\n0,1\n0,2\n", "Line 3: The times must increase, but 0 s follows 0 s."),
-        ("0,1\n1,x\n", "Line 2 of {path}: a number was expected in column 2, not 'x'."),
+        (
+            "0,1\n1,x\n",
+            "Line 2 of {path}: a number was expected in column 2, not 'x'. Leave a cell without a value empty.",
+        ),
         ("0,1\n1\n", "Line 2: Time and force must be finite numbers."),
         (
             "t,f\n0,1\n1,2,3\n",

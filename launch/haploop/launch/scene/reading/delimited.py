@@ -167,7 +167,8 @@ class DelimitedFile:
         except ValueError:
             name = self.columns[index].name
             raise RecordingError(
-                f"Line {line} of {self.path}: a number was expected in column {name}, not {cells[index].strip()!r}."
+                f"Line {line} of {self.path}: a number was expected in column {name}, not {cells[index].strip()!r}. "
+                "Leave a cell without a value empty."
             ) from None
 
     def _number_text(self, cell: str) -> str:
