@@ -24,7 +24,7 @@ _WORDS = {
     "logged_s": ("log ends at", "s"),
     "oscillation_m": ("oscillation at the end", "m"),
     "force_swing_N": ("commanded force, peak to peak", "N"),
-    "force_ripple_N": ("its ripple above 30 Hz", "N"),
+    "force_ripple_N": ("commanded ripple above about 30 Hz", "N"),
     "width_m": ("pushed, it swings by", "m"),
     "frequency_Hz": ("  at", "Hz"),
     "trajectory_sha256": ("trajectory hash", ""),

@@ -17,6 +17,7 @@ from haploop.tools.render.report import (
     count_losses,
     displayed_stiffness,
     leak_rows,
+    limited,
     noted,
     plant_books,
     swing_words,
@@ -142,7 +143,9 @@ def key_numbers(run: RunData) -> list[str]:
         words.append(f"outside the wall {100 * window['outside_fraction']:.0f} %")
         displayed = displayed_stiffness(run.summary)
         wanted = f" of {spring(wall.stiffness)}" if wall.kind in (None, "spring") else ""
-        words += [f"displayed stiffness {spring(displayed)}{wanted}"] if displayed is not None else []
+        words += (
+            [f"displayed stiffness {spring(displayed)}{wanted}{limited(run.summary)}"] if displayed is not None else []
+        )
     left = f"residual {amount(energy['residual_J'], 'J')} of " if "unmodelled_work_J" not in energy else ""
     words.append(f"{left}{amount(energy['moved_J'], 'J')} moved")
     words += [energy["balance"].partition(" of the energy")[0]] if "balance" in energy else []

@@ -23,15 +23,16 @@ if TYPE_CHECKING:
 
 _ITS_WORD = "Only the {} itself says that it does what the scene says; haploop replay checks it against the scene."
 _TRIED = "with the hand's force of {}, pushed by up to {}; haploop advise tries taps, other holds and devices"
+_LIMITED = " commanded; the actuator gave less at times"
 # Frequencies that differ by no more than this share, or by this much, which is how finely crossings tell them, are one.
 _ALIKE, _COARSE_HZ = 0.15, 1.5
-_AT, _CROSSED = ", at about {0} Hz", ", through its mean {1} times a second"
+_AT, _CROSSED = ", at about {0} Hz", ", through its mean {0} times a second"
 _NOTE = "A note on its scene: {first}"
 _NOTES = "{count} notes on its scene; the first: {first}"
 # Entries of the summary's window, their words, and what stands after the number. Peaks of two swings do not add.
 _OF_FORCE = {
     "force_swing_N": ("commanded force", " peak to peak at its end"),
-    "force_ripple_N": ("its ripple", " peak to peak, above 30 Hz only"),
+    "force_ripple_N": ("commanded ripple", " peak to peak, above about 30 Hz only"),
 }
 # Entry of the summary, the count in it, and its words.
 _COUNTS = (
@@ -59,17 +60,23 @@ def plant_books(energy: Summary) -> dict[str, str]:
     return {key: name for key, name in words.items() if key in energy}
 
 
-def how_often(summary: Summary) -> str:
-    """Returns how often a swing went to and fro at its end; "" where it did not.
+def limited(summary: Summary) -> str:
+    """Returns what to say beside a stiffness or force of the command where the actuator gave less than that."""
+    return _LIMITED * bool(summary.get("actuator", {}).get("saturated_commands"))
 
-    That is its frequency unless it crosses its mean more often than once in half a period, as what bounces on a wall
-    does: then the frequency of the pushed loop is another.
+
+def how_often(summary: Summary) -> str:
+    """Returns how often a swing went to and fro at its end; "" where it did not, or where its frequency is told anyway.
+
+    Half its crossings a second are its frequency, to 1 Hz, unless it crosses its mean more often than once in half a
+    period, as what bounces on a wall does. The frequency of the pushed loop, which is told, is more exact.
     """
     if not (crossed_Hz := summary["window"].get("frequency_Hz")):
         return ""
-    pushed_Hz = summary.get("stability", {}).get("frequency_Hz") or crossed_Hz
-    is_plain = abs(crossed_Hz - pushed_Hz) <= max(_ALIKE * pushed_Hz, _COARSE_HZ)
-    return (_AT if is_plain else _CROSSED).format(fixed(crossed_Hz, 0), fixed(2.0 * crossed_Hz, 0))
+    if not (pushed_Hz := summary.get("stability", {}).get("frequency_Hz")):
+        return _AT.format(fixed(crossed_Hz, 0))
+    is_same = abs(crossed_Hz - pushed_Hz) <= max(_ALIKE * pushed_Hz, _COARSE_HZ)
+    return "" if is_same else _CROSSED.format(fixed(2.0 * crossed_Hz, 0))
 
 
 def displayed_stiffness(summary: Summary) -> float | None:
@@ -157,7 +164,7 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
         )
     if (displayed := displayed_stiffness(summary)) is not None:
         beyond = " at the motor; the cable gives way, too" if "cable_heat_J" in summary["energy"] else ""
-        figures.append(("displayed stiffness", spring(displayed) + beyond))
+        figures.append(("displayed stiffness", spring(displayed) + limited(summary) + beyond))
     if happened := count_losses(summary):
         figures.append(("in all", ", ".join(f"{count} {words}" for words, count in happened.items())))
     return figures
@@ -248,7 +255,7 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     if not rests(found):
         watched = f"watched for {found['watched_s']:g} s"
         rows += [
-            ("its force ripples by", f"{amount(found['force_ripple_N'], 'N')} peak to peak above 30 Hz"),
+            ("its commanded ripple", f"{amount(found['force_ripple_N'], 'N')} peak to peak above about 30 Hz"),
             ("growth", f"of the steadier swing {found['rate_1_s']:.3g} +- {found['error_1_s']:.2g} 1/s, {watched}"),
         ]
     if (share := found.get("own_share")) is not None:

@@ -80,7 +80,9 @@ export class ComparePanel {
 function power(side, name) {
   const { rows, from_s: from, to_s: to } = side?.budget ?? {};
   const row = rows?.find((one) => one.name === name);
-  return row && to > from ? amount(row.window_J / (to - from), "W") : NONE;
+  if (!row || !(to > from)) return NONE;
+  const largest = Math.max(...rows.map((one) => Math.abs(one.window_J)));
+  return amount(Math.abs(row.window_J) < 1e-9 * largest ? 0 : row.window_J / (to - from), "W"); // the rest is rounding
 }
 
 function words({ tick }, [before, after]) {

@@ -32,7 +32,7 @@ export class OwnPanel {
     this.charts = own.map(({ columns: [{ unit }] }, i) => {
       const host = this.host.appendChild(make("section", { class: "chart", "aria-label": `own columns in ${unit || "pure numbers"}` }));
       const times = i === own.length - 1;
-      return new TimeChart(host, { label: "", unit, prefix: "", least: 1e-9, zero: false, times }, this.viewport);
+      return new TimeChart(host, { label: "", unit, prefix: "", least: 1e-9, share: 0.01, zero: false, times }, this.viewport);
     });
   }
 

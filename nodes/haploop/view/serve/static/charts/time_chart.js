@@ -26,14 +26,15 @@ const BOX_PX = 4;
 export class TimeChart {
   /**
    * @param {HTMLElement} host takes the chart.
-   * @param {object} options label, SI unit and first prefix of the left axis; least: it never covers less, in SI; zero:
+   * @param {object} options label, SI unit and first prefix of the left axis; least: it never covers less, in SI, nor than a
+   *   share of its largest number; zero:
    *   it always shows 0; times: whether the times are below the chart.
    * @param {import("../viewport.js").Viewport} viewport what dragging in the chart changes.
    */
   constructor(host, options, viewport) {
     Object.assign(this, { host, options, viewport });
     this.unit = new ClimbingUnit(options.unit, options.prefix);
-    this.range = new Range(options.least * this.unit.factor);
+    this.range = new Range(options.least * this.unit.factor, options.share);
     this.legend = new Legend(host, () => this.retoggle());
     this.plot = host.appendChild(make("div", { class: "plot" }));
     this.box = boxOf(this.plot, () => this.resize());
@@ -145,7 +146,7 @@ export class TimeChart {
     const [low, high] = extent(lines.map(({ values }) => values));
     const largest = Math.max(Math.abs(low), Math.abs(high));
     const climbs = largest > 0 && this.unit.serve(Math.max(largest, this.options.least));
-    if (climbs) Object.assign(this, { range: new Range(this.options.least * this.unit.factor) });
+    if (climbs) Object.assign(this, { range: new Range(this.options.least * this.unit.factor, this.options.share) });
     return climbs;
   }
 

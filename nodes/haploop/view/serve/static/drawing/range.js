@@ -18,9 +18,9 @@ export function extent(columns, extra = []) {
 }
 
 export class Range {
-  /** @param {number} least the axis never covers less than this. */
-  constructor(least) {
-    this.least = least;
+  /** @param {number} least the axis never covers less than this, nor than this `share` of its largest number. */
+  constructor(least, share = 0) {
+    Object.assign(this, { least, share });
     this.now = [-least, least];
     this.forget();
   }
@@ -34,7 +34,7 @@ export class Range {
   follow(low, high) {
     if (!(low <= high)) return this.now;
     const [bottom, top] = this.now;
-    const needed = Math.max(high - low, this.least);
+    const needed = Math.max(high - low, this.least, this.share * Math.max(Math.abs(low), Math.abs(high)));
     if (this.fresh || low < bottom || high > top || needed < FILLED * (top - bottom)) {
       const middle = (low + high) / 2;
       const half = needed * (0.5 + MARGIN);

@@ -33,8 +33,8 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
     "pushed, it swings":
       found.width_m < 1e-9 ? "less than 1 nm" : `${amount(found.width_m, "m")} ± ${amount(found.spread_m, "m", 2)}`,
     "that is": [...how, found.chaotic && "chaotic"].filter(Boolean).join(", "),
-    "pushed, it ripples": `${amount(found.force_ripple_N, "N")} above 30 Hz`,
-    growth: `${fixed(rate)} ± ${fixed(error, 2)} 1/s`,
+    "pushed, it ripples": `${amount(found.force_ripple_N, "N")} above about 30 Hz, commanded`,
+    ...(found.width_m < 1e-9 ? {} : { growth: `${fixed(rate)} ± ${fixed(error, 2)} 1/s` }),
     ...(isNumber(found.settles_s) ? { "settles within": `${amount(found.settles_s, "s")}, to 5 %` } : {}),
     ...(found.blown ? { [`after a blow of ${amount(found.blow_N, "N")}`]: found.blown } : {}),
     ...(found.deeper ? { [`held ${amount(found.deeper_N, "N")} harder`]: found.deeper } : {}),
@@ -59,7 +59,7 @@ function figures({ duration_s, ended, extremes = {}, window = {}, real_time_fact
     ...(isNumber(window.oscillation_m) ? { [`oscillation, ${last}`]: `${amount(window.oscillation_m, "m")} p-p` } : {}),
     ...(isNumber(window.force_swing_N) ? { "commanded force": `${amount(window.force_swing_N, "N")} p-p` } : {}),
     // The ripple of the run itself: it includes noise and the hand, which the pushed copies do not have.
-    ...(isNumber(window.force_ripple_N) ? { "its own ripple": `${amount(window.force_ripple_N, "N")} above 30 Hz` } : {}),
+    ...(isNumber(window.force_ripple_N) ? { "its own ripple": `${amount(window.force_ripple_N, "N")} above about 30 Hz, commanded` } : {}),
     "largest force": amount(extremes.force_max_N, "N"),
     "real time": isNumber(factor) ? `${fixed(factor)}×${wasPaused ? ", pauses included" : ""}` : NONE,
     "commands lost, dropped": `${lost.commands_lost ?? 0}, ${lost.commands_dropped ?? 0}`,
