@@ -168,6 +168,11 @@ def test_samples_given_in_python_that_do_not_fit_together_are_told_as_values_not
         loaded_in_python("demo", {"hand.force": trace})
 
 
+def test_a_value_of_a_type_that_no_scene_holds_is_told_with_its_key():
+    with pytest.raises(TypeError, match=r"^values: wall\.stiffness: A scene holds text, .* but not None\.$"):
+        loaded_in_python("demo", {"wall.stiffness": None})
+
+
 def test_a_plugin_brings_its_own_parameters_units_and_defaults():
     class Brake(Element):
         kind = "limit"  # the name of its parameter, to make sure that the two are told apart

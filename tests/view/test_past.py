@@ -66,6 +66,15 @@ def test_a_hand_that_still_moves_is_told_beside_what_is_seen(tmp_path, monkeypat
     assert state(PastSession(next(iter(LiveRuns().past()))))["hand_moves"] is moves
 
 
+@pytest.mark.parametrize(("most_N", "told"), [(0.2, False), (5.0, True)])
+def test_no_stiffness_is_displayed_where_the_actuator_cannot_give_the_force(tmp_path, monkeypatch, most_N, told):
+    """A wall of 2 N/mm behind an actuator of 0.3 N was said to display 2 N/mm, and displayed 0.6 N/mm."""
+    monkeypatch.chdir(tmp_path)
+    run(load("premium_press", {"actuator.saturation": most_N, "run.verdict": "window"}), out="runs/one")
+    now = state(PastSession(next(iter(LiveRuns().past()))))
+    assert (now["displayed_stiffness_N_m"] is not None) == told == (now["sight"]["stiffness_N_m"] is not None)
+
+
 @pytest.mark.slow
 def test_the_loop_of_a_run_that_has_ended_goes_to_its_end_and_no_further(tmp_path, monkeypatch):
     """The row of its end state is filled with numbers that are none, of which a wall's curve would be, too."""

@@ -202,8 +202,15 @@ def texts(values: Values) -> list[str]:
     if isinstance(values, str):
         raise TypeError(SET_SO)
     if isinstance(values, Mapping):
-        return [f"{key}={inline(plain(value))}" for key, value in values.items()]
+        return [_text(key, value) for key, value in values.items()]
     return list(values)
+
+
+def _text(key: str, value: Any) -> str:
+    try:
+        return f"{key}={inline(plain(value))}"
+    except TypeError as error:
+        raise TypeError(f"values: {key}: {error}") from None
 
 
 def plain(value: Any) -> Any:

@@ -154,6 +154,8 @@ def state(session: RunSession) -> Message:
     judged = (summary, summary["window"], summary["energy"]) if summary else (session.status,) * 3
     for entry, names in zip(judged, _JUDGED, strict=True):
         message |= {name: entry.get(name) for name in names}
+    if sight and sight.stiffness_N_m is None:
+        message["displayed_stiffness_N_m"] = None
     # Options are by far the largest part, and have been fit for JSON since they came.
     return {**finite(message), "options": None if session.outcome else session.clock.options}
 

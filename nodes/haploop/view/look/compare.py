@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -29,8 +30,8 @@ class Half:
 class Changes:
     """Keeps the half second before every swap and set of a run, which a history of full rows forgets."""
 
-    def __init__(self, resolution_m: float) -> None:
-        self._resolution_m = resolution_m
+    def __init__(self, resolution_m: float, most_N: float = math.inf) -> None:
+        self._limits = resolution_m, most_N
         self._before: dict[int, Half | None] = {}
         self._ticks: list[int] = []
 
@@ -49,7 +50,7 @@ class Changes:
 
     def _half(self, history: History, since: int, end: int) -> Half | None:
         first = max(since, end - window_ticks(history.time.control_rate))
-        seen = see(history, since, end, self._resolution_m)
+        seen = see(history, since, end, *self._limits)
         if seen is None or first < history.steps.full_from_tick:
             return None
         n, traces = history.time.steps_per_tick, history.steps.rows(("x", "force"), first, end)
@@ -62,7 +63,7 @@ class Changes:
     def sight(self, history: History) -> Sight | None:
         """Returns what the newest ticks show since the last change; None before there are any."""
         end = last_tick(history)
-        return see(history, self.since(end), end, self._resolution_m)
+        return see(history, self.since(end), end, *self._limits)
 
     def pair(self, history: History) -> tuple[int, Half | None, Half | None] | None:
         """Returns the tick of the last change, and its two sides, each None if it is not held; None without a change.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,7 +57,8 @@ class Sight:
         force_swing_N: width of the applied force with its trend, peak to peak.
         rests: whether the position, in the newest window, swung by no more than what counts as a swing.
         frequency_Hz: of the line of the position if one stands out, else of the line of the force; None without one.
-        stiffness_N_m: mean of force over penetration at the ticks in contact; None without any.
+        stiffness_N_m: mean of force over penetration at the ticks in contact; None without any, or where the actuator
+            could not give the force.
     """
 
     word: str
@@ -77,20 +79,21 @@ def window_ticks(rate: int) -> int:
     return max(2, round(WINDOW_S * rate))
 
 
-def see(history: History, since: int, end: int, resolution_m: float) -> Sight | None:
+def see(history: History, since: int, end: int, resolution_m: float, most_N: float = math.inf) -> Sight | None:
     """Returns what the ticks before ``end`` show; None where none of them is held in full.
 
     Args:
         since: tick of the last change of the loop, or of its start: what was before is another regime. So is what was
             before a contact that came after more than a window without contact.
         resolution_m: of the encoder; swings within it do not count. 0 without an encoder.
+        most_N: the actuator's largest force; where more was commanded, no stiffness is displayed.
     """
     rate, window = history.time.control_rate, window_ticks(history.time.control_rate)
     known = max(history.steps.full_from_tick, history.ticks.full_from_tick, history.first_tick or 0)
     begin, by = max(since, known), "the start" if since <= known else f"{since / rate:g} s"
     if end - begin < 4:
         return None
-    inside, stiffness = _contact(history, max(known, end - 2 * window), end)
+    inside, stiffness = _contact(history, max(known, end - 2 * window), end, most_N)
     came = end - len(inside) + int(np.argmax(inside)) if inside.any() else None
     if came is not None and came > max(begin, end - window) and came > end - len(inside):
         begin, by = came, f"contact at {came / rate:g} s"
@@ -148,8 +151,11 @@ def see(history: History, since: int, end: int, resolution_m: float) -> Sight | 
     )  # fmt: skip
 
 
-def _contact(history: History, first: int, end: int) -> tuple[np.ndarray, float | None]:
-    """Returns whether each tick was in contact, and the mean of total force over penetration in the newest window."""
+def _contact(history: History, first: int, end: int, most_N: float) -> tuple[np.ndarray, float | None]:
+    """Returns whether each tick was in contact, and the mean of total force over penetration in the newest window.
+
+    That is None without contact there, and where more than ``most_N`` was commanded.
+    """
     position, x, total = history.ticks.rows(("wall_position", "x_measured", "total"), first, end)
     depth = (x - position) * history.at_work.into_wall
     with np.errstate(invalid="ignore"):
@@ -158,6 +164,8 @@ def _contact(history: History, first: int, end: int) -> tuple[np.ndarray, float 
     if not len(newest):
         return inside, None
     newest += max(0, len(inside) - window_ticks(history.time.control_rate))
+    if (np.abs(total[newest]) > most_N).any():
+        return inside, None
     ratio = -total[newest] * history.at_work.into_wall / depth[newest]
     return inside, float(ratio.mean()) if np.isfinite(ratio).all() else None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time as wall_clock
 from collections import deque
 from collections.abc import Sequence
@@ -62,7 +63,10 @@ class RunSession:
         self.scene, self.time, self.out, self.history = scene, time, out, history
         self.status: Message = {}
         self.events: list[tuple[int, Event]] = []
-        self.changes = Changes(scene.encoder.resolution if scene.encoder else 0.0)
+        most_N = scene.actuator.saturation if scene.actuator else None
+        self.changes = Changes(
+            scene.encoder.resolution if scene.encoder else 0.0, math.inf if most_N is None else most_N
+        )
         self.delay_s = scene.clock.round_trip_delay
         self.outcome = self.why = ""
         self.given_up = False
