@@ -47,7 +47,7 @@ def test_the_terminal_says_the_word_first_and_then_why(run):
     lines = [line.strip() for line in result.stdout.splitlines()]
     assert lines[0] == "limit-cycle"
     assert lines[1].startswith("Pushes of 0.195 N and of a tenth of it end in the same swing")
-    assert any(line.startswith("its force ripples by") for line in lines)
+    assert any(line.startswith("its commanded ripple") for line in lines)
 
 
 def test_a_moving_hand_is_told_beside_the_word_as_it_is_in_the_runs_own_summary(run):
