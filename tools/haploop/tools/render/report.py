@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _ITS_WORD = "Only the {} itself says that it does what the scene says; haploop replay checks it against the scene."
 _TRIED = "with the hand's force of {}, pushed by up to {}; haploop advise tries taps, other holds and devices"
-_LIMITED = " commanded; the actuator gave less at times"
+_LIMITED = "; of the command: the actuator gave less at times"
 # Frequencies that differ by no more than this share, or by this much, which is how finely crossings tell them, are one.
 _ALIKE, _COARSE_HZ = 0.15, 1.5
 _AT, _CROSSED = ", at about {0} Hz", ", through its mean {0} times a second"
@@ -164,7 +164,7 @@ def _key_figures(summary: Summary) -> list[tuple[str, str]]:
         )
     if (displayed := displayed_stiffness(summary)) is not None:
         beyond = " at the motor; the cable gives way, too" if "cable_heat_J" in summary["energy"] else ""
-        figures.append(("displayed stiffness", spring(displayed) + limited(summary) + beyond))
+        figures.append(("displayed stiffness", spring(displayed) + beyond + limited(summary)))
     if happened := count_losses(summary):
         figures.append(("in all", ", ".join(f"{count} {words}" for words, count in happened.items())))
     return figures

@@ -24,6 +24,9 @@ from haploop.protocol.names import nearest
 Floats = NDArray[np.float64]
 
 _BLOCK_ROWS = 16_384
+# Names by which columns of times and forces are known; without a unit, times are seconds under the last.
+SECONDS = "seconds"
+TIMES, FORCES = ("t", "time", "timestamp", SECONDS), ("force", "f")
 # First bytes of a text in that code.
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 # What a cell without a value may hold.

@@ -8,13 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from haploop.launch.scene.models import fault
-from haploop.launch.scene.reading.delimited import Column, DelimitedFile, RecordingError
+from haploop.launch.scene.reading.delimited import FORCES, TIMES, Column, DelimitedFile, RecordingError
 from haploop.launch.scene.units import scale_of
 from haploop.protocol.files import MOST_BYTES, demand_regular
 
-# Names by which a column is known.
-_TIMES = ("t", "time", "timestamp", "seconds")
-_FORCES = ("f", "force")
 _WHICH = "Which column of {path} is the {what}? Name it with {what}_column, by name or number. There are: {names}."
 
 
@@ -35,7 +32,7 @@ def read_trace(path: Path, time: str | None = None, force: str | None = None) ->
     except OSError as error:
         raise RecordingError(f"The recording {path} cannot be read: {error.strerror}.") from error
     file = DelimitedFile(path)
-    columns = [_column(file, time, "time", _TIMES, "s"), _column(file, force, "force", _FORCES, "N")]
+    columns = [_column(file, time, "time", TIMES, "s"), _column(file, force, "force", FORCES, "N")]
     if columns[0] == columns[1]:
         raise RecordingError(_WHICH.format(path=path, what="force", names=_names(file)))
     scales = [_scale(file, column, unit) for column, unit in zip(columns, ("s", "N"), strict=True)]

@@ -9,20 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from haploop.launch.scene.reading.delimited import Column, DelimitedFile, Floats, RecordingError
+from haploop.launch.scene.reading.delimited import FORCES, SECONDS, TIMES, Column, DelimitedFile, Floats, RecordingError
 from haploop.launch.scene.units import scale_of
 from haploop.tools.dissipate.recording.plausible import Largest
 from haploop.tools.dissipate.recording.repeats import repeats
 from haploop.tools.dissipate.recording.samples import Notes, Samples
 from haploop.tools.dissipate.recording.stamps import ONE_MISSING, Flags, Stamps, is_late, stamps
 
-# Times without a unit are seconds under this name; under others only if they are not far apart.
-_SECONDS = "seconds"
-# Names of columns that are looked for where none is given.
-_TIMES = ("t", "time", "timestamp", _SECONDS)
+# Names of a column of positions, which is looked for where none is given.
 _POSITIONS = ("x", "position", "pos", "displacement")
-# Columns that may be a force, which is read only where it is asked for: its sign and its hold are not in the file.
-_FORCES = ("force", "f")
 _SORT = "sort its rows by time."
 _TOO_FAST = "give the rate with --rate if samples came faster than their clock."
 _FAR_APART_S = 0.1
@@ -81,7 +76,8 @@ class TextRecording:
         if file.title:
             self.notes.remarks.append(f"Lines above the header, taken as a title: {file.title}.")
         self.has_force = "force" in self._columns
-        if not self.has_force and (unread := file.find(_FORCES)):
+        # A force is read only where it is asked for: its sign and its hold are not in the file.
+        if not self.has_force and (unread := file.find(FORCES)):
             self.notes.remarks.append(f"Column {unread.name} was not read: --force {unread.name} books its work.")
         self.recorded = frozenset(name for name in ("velocity", "acceleration") if name in self._columns)
         of = Stamps(1.0 / layout.rate_Hz) if layout.rate_Hz else self._stamps(layout.time_unit)
@@ -104,7 +100,7 @@ class TextRecording:
         if "position" not in columns:
             columns["position"] = self._guessed(file, _POSITIONS, "position", "m")
         if layout.rate_Hz is None and "time" not in columns:
-            columns["time"] = self._guessed(file, _TIMES, "time", "s")
+            columns["time"] = self._guessed(file, TIMES, "time", "s")
         if layout.rate_Hz is not None and "time" in columns:
             raise RecordingError("Give either the column of the time or the rate, not both.")
         scales = {}
@@ -155,7 +151,7 @@ class TextRecording:
                 f"The times in column {self._columns['time'].name} of {self._file.path} do not increase; {advice}"
             )
         column, times = self._columns["time"], block[0]["time"]
-        has_unit = unit or column.unit or column.name.strip().lower() == _SECONDS
+        has_unit = unit or column.unit or column.name.strip().lower() == SECONDS
         if not has_unit and period_s >= _FAR_APART_S:
             raise RecordingError(
                 f"Are the times in column {column.name} of {self._file.path}, {times[0]:g}, {times[1]:g} and so on, "
