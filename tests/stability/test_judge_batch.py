@@ -65,6 +65,12 @@ def within_counts() -> list[Scene]:
     return [with_value(base, "wall.stiffness", k) for k in (200.0, 583.0, 850.0)]
 
 
+def limited() -> list[Scene]:
+    """Hands with a spring behind a Premium 1.5 whose actuator gives less than the walls command, and more."""
+    base = replace(load("premium_press"), duration=0.8)
+    return [with_value(base, "actuator.saturation", most_N) for most_N in (0.3, 2.0, 6.9)]
+
+
 FAMILIES: dict[str, Callable[[], list[Scene]]] = {
     "plain": lambda: shipped("fig6a", [20.0, 200.0, 3000.0]),
     "inertia": lambda: shipped("fig6c", [20.0, 60.0, 150.0]),
@@ -73,6 +79,7 @@ FAMILIES: dict[str, Callable[[], list[Scene]]] = {
     "swaying": swaying,
     "counts": within_counts,
     "devices that rub": devices,
+    "limited": limited,
     "friction or none": friction_or_none,
     "observing": lambda: [observed(k, run={"verdict": "pushed"}) for k in (300.0, 2000.0)],
 }

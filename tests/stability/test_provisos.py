@@ -134,6 +134,19 @@ def test_a_loop_without_friction_that_noise_moves_by_as_much_as_a_hand_feels_say
     assert {"noise shakes it", "its force ripples"} <= {*summary["stability"]["provisos"]}
 
 
+@pytest.mark.parametrize(("most_N", "depth_m", "is_said"), [(0.3, (1.0 - 0.3) / 200.0, True), (5.0, 1 / 700.0, False)])
+def test_a_loop_whose_actuator_is_at_its_limit_where_it_rests_says_so_beside_the_word(most_N, depth_m, is_said):
+    """A hand of 1 N and 200 N/m: its spring takes what an actuator of 0.3 N does not give; a wall of 500 N/m else."""
+    of = scene(**pressed(
+        device={"mass": 0.1, "damping": 5.0}, actuator={"saturation": most_N},
+        hand={"force": {"kind": "constant", "value": -1.0}, "stiffness": 200.0, "rest": 0.0}))  # fmt: skip
+    end = ended(of)
+    finding = judge(end)
+    assert end.plant.state()["x"] == pytest.approx(-depth_m, rel=1e-3)
+    assert (finding.word, finding.saturated) == ("steady", is_said)
+    assert finding.entries()["stability"]["provisos"] == ["its actuator is at its limit"] * is_said
+
+
 def test_of_a_push_that_friction_withstands_it_is_said_that_nothing_moved():
     finding = found(scene(**pressed(friction={"kinetic": 0.9})))
     assert (finding.word, finding.why, finding.settles_s) == ("steady", "unmoved", None)

@@ -94,6 +94,7 @@ class Finding:
             within the device's limit, or than the actuator can.
         settles_s: how long after the push it came within 5 % of where it rests; None if it does not.
         memory_drifts: whether the memory of an element still changes while the loop rests.
+        saturated: whether the actuator was at its largest force at any of the last quarter of the ticks watched.
     """
 
     word: str
@@ -122,6 +123,7 @@ class Finding:
     without: Mapping[str, str] | None = None
     settles_s: float | None = None
     memory_drifts: bool = False
+    saturated: bool = False
     detail: str = ""
 
     @property
@@ -132,15 +134,13 @@ class Finding:
     def after_blow(self, found: Finding) -> Finding:
         """Returns the finding with what was found after a harder push: undecided unless it rests then, too."""
         blown = found.why if found.why == "rests off the wall" else DOES.get(found.word, "undecided")
-        drift = self.memory_drifts or found.memory_drifts
-        struck = replace(self, blow_N=found.push_N, blown=blown, memory_drifts=drift)
+        struck = replace(self, blow_N=found.push_N, blown=blown, **self._at_either(found))
         return struck if blown.startswith("rests") else replace(struck, word="undecided", why="rested")
 
     def held_harder(self, hold_N: float, found: Finding) -> Finding:
         """Returns the finding with what was found at a harder hold: undecided unless it rests there, too."""
         does = DOES.get(found.word, "undecided")
-        drift = self.memory_drifts or found.memory_drifts
-        told = replace(self, hardest_N=abs(hold_N), at_hardest=does, memory_drifts=drift)
+        told = replace(self, hardest_N=abs(hold_N), at_hardest=does, **self._at_either(found))
         return told if does == "rests" else replace(told, word="undecided", why="rested")
 
     @property
@@ -157,9 +157,15 @@ class Finding:
         if self.frictionless:
             does = f"{does} a part of a count deeper" if does == "swings on" else does
             return replace(self, frictionless=does, frictionless_m=_lasting_m(found))
-        drift = self.memory_drifts or found.memory_drifts
-        told = replace(self, deeper_N=abs(more_N), deeper=does, memory_drifts=drift)
+        told = replace(self, deeper_N=abs(more_N), deeper=does, **self._at_either(found))
         return told if does == "rests" else replace(told, word="undecided", why="rested")
+
+    def _at_either(self, found: Finding) -> dict[str, bool]:
+        """Returns what is told of a loop that rests if it holds here or where it was tried next."""
+        return {
+            "memory_drifts": self.memory_drifts or found.memory_drifts,
+            "saturated": self.saturated or found.saturated,
+        }
 
     def without_friction(self, found: Finding) -> Finding:
         """Returns the finding with what was found after the same push of the loop without its friction."""
@@ -195,6 +201,7 @@ class Finding:
             "only friction holds it": self.frictionless in ("swings on", "swings on a part of a count deeper"),
             "perhaps only friction holds it": self.frictionless == "undecided",
             "an element's memory still changes": self.memory_drifts,
+            "its actuator is at its limit": self.saturated,
             "tried at only some holds of its hand": HAND_MOVES in beside,
             "noise shakes it": NOISE in beside and (seen_m or 0.0) > _SHAKEN_M,
             "its swing dies slowly": self.why == "decays" and self.felt,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from haploop.launch.stability.decide import decide
 from haploop.launch.stability.finding import HAND_MOVES, NOISE, Finding
 from haploop.launch.stability.still_hand import LEAST_PRESS_N, press_of
 from haploop.launch.stability.swing import Pushed, measure
+from haploop.plant.line.actuator import Actuator
 from haploop.protocol.scene.hand_force import constant_from_s
 from haploop.protocol.scene.scene import Hand, Scene
 from haploop.protocol.ticks import Timebase
@@ -101,7 +103,15 @@ def findings(
     smooth = np.array([is_smooth(scene) for scene in scenes])
     pushed = Pushed(small, large, command, np.abs(push_N), count_m, inside, stays, smooth)
     swings = measure(pushed, time.control_rate)
-    return [decide(swing, last=last) for swing in swings]
+    found = [decide(swing, last=last) for swing in swings]
+    limited = [_is_limited(scene, some) for scene, some in zip(scenes, command[:, -quarter:], strict=True)]
+    return [replace(each, saturated=is_limited) for each, is_limited in zip(found, limited, strict=True)]
+
+
+def _is_limited(scene: Scene, command: np.ndarray) -> bool:
+    """Tells whether the actuator of a scene cuts off any of these commands, N."""
+    actuator = scene.actuator and Actuator(scene.actuator.resolution, scene.actuator.saturation)
+    return actuator is not None and bool(np.any(actuator.drive(command)[1]))
 
 
 def is_smooth(scene: Scene) -> bool:
