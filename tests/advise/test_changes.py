@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from haploop.protocol.amounts import fixed
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import ElementTable
 from haploop.tools.advise import advice as of_advice
@@ -31,7 +32,6 @@ from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.walls.store import Failure, Job, Store
 from haploop.tools.advise.walls.trial import Trial
 from haploop.tools.advise.withstand import Best
-from haploop.tools.render.units import fixed
 from helpers.data.advices import ADVICE
 from helpers.scenes.least import scene
 from helpers.scenes.presets import loop_of

@@ -19,8 +19,8 @@ import numpy as np
 import haploop.logger
 from haploop.launch.foreign import read_programs
 from haploop.launch.runs.start import prepare, run
+from haploop.protocol.amounts import amount
 from haploop.tools.render.terminal import markdown_table
-from haploop.tools.render.units import amount
 
 HOUSE = Path(__file__).parents[2]
 SCENE = HOUSE / "launch/scenes/fig6b.toml"

@@ -66,16 +66,12 @@ def test_a_verdict_is_a_word_a_shape_of_its_own_and_a_colour(stand_in, open_page
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("word", "rate"), [("diverged", None), ("limit-cycle", 0.0)])
-def test_of_a_loop_that_swung_or_diverged_every_trial_without_a_part_has_a_row(stand_in, open_page, word, rate):
-    without = {"round-trip delay": "rests", "friction": "swings on"}
-    stability = {"rate_1_s": rate, "error_1_s": rate, "width_m": 1e-3, "spread_m": 0.0, "without": without}
+@pytest.mark.parametrize("cause", ["Likely cause: friction. Started anew on the wall, the loop rests without it.", ""])
+def test_a_run_that_ended_tells_its_cause_where_one_was_found(stand_in, open_page, cause):
     page = open_page(stand_in.url)
-    summary = SUMMARY | {"verdict": word, "stability": stability, "trajectory_sha256": "ef" * 32}
-    stand_in.state(**ENDED | {"verdict": word, "summary": summary})
-    for part, does in without.items():
-        row = page.locator("#summary .rows div", has=page.get_by_text(f"without {part}", exact=True))
-        expect(row.locator("dd")).to_have_text(does)
+    stand_in.state(**ENDED | {"verdict": "limit-cycle", "cause": cause})
+    expect(page.locator("#cause")).to_have_text(cause)
+    expect(page.locator("#cause")).to_be_visible(visible=bool(cause))
 
 
 def style(page, name):

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from haploop.protocol.amounts import amount
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.dissipate.recording.text_recording import Layout
 from haploop.tools.dissipate.report import conclusion, note_sentences
-from haploop.tools.render.units import amount
 from helpers.data.recordings import outcome, write
 
 

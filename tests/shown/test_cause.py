@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from haploop.tools.render.cause import cause
+from haploop.logger.cause import cause
 from haploop.tools.render.report import summary_table
 from helpers.shown import shown
 

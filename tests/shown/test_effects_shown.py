@@ -12,11 +12,11 @@ from matplotlib.text import Text
 import haploop.logger
 from haploop.launch.runs.start import prepare, run
 from haploop.logger.log.channels import motion_columns
+from haploop.protocol.amounts import amount
 from haploop.tools.figure import style
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.run_figure import book_rows, make_figure
 from haploop.tools.render.report import summary_table
-from haploop.tools.render.units import amount
 from helpers.shown import artists, row, shown
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"

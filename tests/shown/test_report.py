@@ -14,12 +14,12 @@ from rich.console import Console
 from haploop.controller.dissipation import Element, Motion, registry
 from haploop.launch.plan.meant.rule import Note
 from haploop.launch.runs.start import prepare, run
+from haploop.protocol.amounts import amount, fixed
 from haploop.protocol.quantity import Quantity
 from haploop.tools.render.listings import plugins_table, status_table
 from haploop.tools.render.progress import ProgressLine
 from haploop.tools.render.report import how_often, leak_rows, summary_table
 from haploop.tools.render.terminal import told
-from haploop.tools.render.units import amount, fixed
 from helpers.shown import row, shown
 
 SCENES = Path(__file__).parents[2] / "launch/scenes"

@@ -15,9 +15,9 @@ from haploop.launch.stability.causes import with_causes
 from haploop.launch.stability.finding import Finding
 from haploop.launch.stability.judge import judge, judge_scene
 from haploop.launch.stability.looks import LOOKS_S
+from haploop.logger.cause import by_trial
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.linear.one_tick import OneTickMap
-from haploop.tools.render.cause import by_trial
 from helpers.runs.judged import ended
 from helpers.scenes.least import scene
 from helpers.scenes.wild_loops import drawn

@@ -11,6 +11,7 @@ import pytest
 
 from haploop.launch import load, run
 from haploop.launch.runs.run_files import recorded_scene
+from haploop.logger.cause import likely_cause
 from haploop.protocol.scene.scene import ElementTable, Wall
 from haploop.tools.cli.live_runs import LiveRuns
 from haploop.view.draw.messages import event_lines, state
@@ -73,6 +74,20 @@ def test_no_stiffness_is_displayed_where_the_actuator_cannot_give_the_force(tmp_
     run(load("premium_press", {"actuator.saturation": most_N, "run.verdict": "window"}), out="runs/one")
     now = state(PastSession(next(iter(LiveRuns().past()))))
     assert (now["displayed_stiffness_N_m"] is not None) == told == (now["sight"]["stiffness_N_m"] is not None)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "word", "why"), [(3000.0, "limit-cycle", "Likely cause: round-trip delay."), (300.0, "steady", "")]
+)
+def test_of_a_run_that_swings_the_page_tells_the_cause_first_in_short_then_as_the_report_does(
+    tmp_path, monkeypatch, stiffness, word, why
+):
+    monkeypatch.chdir(tmp_path)
+    result = run(load("demo", {"event": [], "wall.stiffness": stiffness}), out="runs/one")
+    now = state(PastSession(next(iter(LiveRuns().past()))))
+    assert (now["verdict"], now["why"]) == (word, why)
+    assert now["cause"] == (likely_cause(result.summary) if why else "")
+    assert now["cause"].startswith(why)
 
 
 @pytest.mark.slow

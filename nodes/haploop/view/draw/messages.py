@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypedDict
 
 import numpy as np
 
+from haploop.logger.cause import SWINGS, cause_in_short, likely_cause
 from haploop.logger.summary import finite
 from haploop.protocol.changes import KINDS, Event, describe, happened_at
 from haploop.protocol.scene.hand_force import constant_from_s
@@ -115,10 +116,12 @@ def state(session: RunSession) -> Message:
     elements, wall = history.at_work
     session.changes.note(history, session.events)
     sight = session.changes.sight(history)
+    swings = bool(summary) and summary["verdict"] in SWINGS
+    why = session.why or _NO_VERDICT.get(session.verdict_is, "")
     message: Message = {
         "type": "state",
         "phase": session.outcome or ("paused" if status.get("paused") else "running"),
-        "why": session.why or _NO_VERDICT.get(session.verdict_is, ""),
+        "why": why or (cause_in_short(summary) if swings else ""),
         "verdict_is": session.verdict_is,
         "run": session.run.id,
         "title": session.scene.title,
@@ -147,6 +150,7 @@ def state(session: RunSession) -> Message:
         "limit_N_m": None if isinstance(session.clock.limit, str) else session.clock.limit,
         "no_limit": session.clock.limit if isinstance(session.clock.limit, str) else "",
         "summary": summary,
+        "cause": likely_cause(summary) if swings else "",
         "sight": sight and dataclasses.asdict(sight),
         "hand_moves": sight is not None and _hand_moves(session.scene, sight.from_s),
     }

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from haploop.protocol.amounts import fixed
 from haploop.protocol.filled import filled
 from haploop.protocol.scene.scene import ElementTable, Hand, Scene
-from haploop.tools.render.units import fixed
 
 Values = tuple[float, ...]
 # How many parameters of one element are tried, from the largest that a loop can bear down, and the factor between them;

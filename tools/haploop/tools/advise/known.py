@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass, replace
 
 from haploop.plant.chain.chain import Chain
+from haploop.protocol.amounts import amount
 from haploop.protocol.filled import filled
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.linear.linearity import installed_kinds, is_linear
 from haploop.tools.linear.one_tick import NeverStable, OneTickMap
-from haploop.tools.render.units import amount
 
 ABBOTT = "Abbott & Okamura 2005"
 

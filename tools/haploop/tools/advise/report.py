@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from haploop.protocol.amounts import amount, fixed
 from haploop.tools.advise.advice import READING, Advice, Changed
 from haploop.tools.advise.changes import CLOSE
 from haploop.tools.advise.walls.felt import felt_force_N
@@ -19,7 +20,7 @@ from haploop.tools.advise.withstand import ROUGH, WORTH, Best
 from haploop.tools.linear.linearity import installed_kinds
 from haploop.tools.linear.terms import one_count
 from haploop.tools.render.terminal import make_facts, make_table
-from haploop.tools.render.units import amount, fixed, format_stiffness
+from haploop.tools.render.units import format_stiffness
 
 _NO_WALL = "none: no wall withstands every case"
 _NOTHING_BREAKS = "nothing that was tried"

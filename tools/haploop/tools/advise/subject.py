@@ -14,13 +14,13 @@ from haploop.controller.dissipation import Element
 from haploop.launch.scene.bundled import bundled, found, like
 from haploop.launch.scene.file import resolved
 from haploop.launch.scene.reading.layers import Layers, read_layers
+from haploop.protocol.amounts import amount
 from haploop.protocol.changes import Change, at_work
 from haploop.protocol.names import nearest
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.walls.registry import class_of
 from haploop.tools.advise.families import STABILIZERS
 from haploop.tools.advise.walls.cases import MOST_DELAY_S, hold_N, make_loop
-from haploop.tools.render.units import amount
 
 # The only measured hand there is, along the axis of Choi et al. 2022.
 DEFAULT_HAND = "fu_cavusoglu_y"

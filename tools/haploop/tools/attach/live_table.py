@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 from haploop.launch.processes import run_directory
 from haploop.launch.processes.run_directory import Elsewhere, LiveRun
+from haploop.protocol.amounts import amount, fixed
 from haploop.protocol.changes import describe
 from haploop.protocol.transport.clock_client import Refused
 from haploop.tools.attach.live_status import LiveStatus
 from haploop.tools.attach.observed_run import ObservedRun, read_summary
 from haploop.tools.command.options import FAILED, WRONG_USE, leave
 from haploop.tools.render.terminal import console, make_facts, make_table, seen, verdict_style
-from haploop.tools.render.units import amount, fixed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from haploop.protocol.amounts import amount, fixed
 from haploop.tools.command.given import kinds_with, print_notes
 from haploop.tools.command.options import Json, Plugin, SceneFile, Set, plain_errors, print_json
 from haploop.tools.render.terminal import make_facts, make_table
-from haploop.tools.render.units import amount, fixed, parameters, spring
+from haploop.tools.render.units import parameters, spring
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -87,11 +87,11 @@ def difference_table(found: Difference) -> RenderableType:
     from rich.console import Group
     from rich.text import Text
 
+    from haploop.protocol.amounts import amount
     from haploop.tools.figure.data import TOGETHER
     from haploop.tools.figure.difference import scene_value
     from haploop.tools.figure.run_names import shortened
     from haploop.tools.render.terminal import make_table, verdict_style
-    from haploop.tools.render.units import amount
 
     table = make_table("", *shortened(found.runs), unbroken=("",))
     if found.names[0] != found.names[1]:
@@ -134,7 +134,7 @@ def parting_words(found: Difference) -> str:
 
 
 def _result(value: Any, unit: str) -> str:
-    from haploop.tools.render.units import amount
+    from haploop.protocol.amounts import amount
 
     if value is None:
         return "–"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from haploop.protocol.amounts import amount
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.advise.walls.cases import HOLDS, SWAY, Case, hold_N, slowness
 from haploop.tools.advise.walls.corners import DELAY, Ranges
-from haploop.tools.render.units import amount
 
 # The hand presses with 1 N, or with this share of the actuator's largest force if that is less: more than in an advice,
 # since no actuator is weaker here than described.

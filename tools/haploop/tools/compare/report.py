@@ -11,12 +11,13 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from haploop.protocol.amounts import amount, fixed
 from haploop.tools.advise.families import NOTHING
 from haploop.tools.compare.bench import MOST_N_M, Row, family_of
 from haploop.tools.compare.comparison import Comparison, OfLoop
 from haploop.tools.compare.ranking import best, choice, held, more, ranking, without
 from haploop.tools.render.terminal import make_facts, make_table
-from haploop.tools.render.units import amount, fixed, format_stiffness
+from haploop.tools.render.units import format_stiffness
 from haploop.tools.search.intervals import mean_interval
 
 READING = (

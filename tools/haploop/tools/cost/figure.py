@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from haploop.protocol.amounts import amount
 from haploop.tools.cost.data import Cost, Errors, Point, SceneCost
 from haploop.tools.cost.findings import COMPILED, is_told_apart, takes_away
 from haploop.tools.figure import style
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
-from haploop.tools.render.units import amount
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from haploop.protocol.amounts import amount, fixed
 from haploop.tools.cost.data import AlikeScene, Cost, Errors, Point, PriceGroup, SceneCost, Spread, Step
 from haploop.tools.operations import WHOLE
-from haploop.tools.render.units import amount, fixed
 
 # The second run of the scene without effects: what it adds is chance.
 AGAIN = "no effect again"

@@ -9,6 +9,7 @@ from pathlib import Path
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from haploop.protocol.amounts import amount, fixed
 from haploop.tools.command.options import WRONG_USE, leave
 from haploop.tools.cost import figure, prices_figure
 from haploop.tools.cost.data import Cost, CostFileError, Point, PriceGroup, SceneCost, load
@@ -25,7 +26,6 @@ from haploop.tools.cost.findings import (
 from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.terminal import make_table, markdown_table
-from haploop.tools.render.units import amount, fixed
 
 # Heads of the columns of a scene's table, and the errors below them.
 _POINTWISE = {"end m": "final_m", "RMS m": "rms_m", "max m": "max_m", "residual": "residual"}

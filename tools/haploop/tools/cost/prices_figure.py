@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from haploop.protocol.amounts import fixed
 from haploop.tools.cost.data import Price, PriceGroup, Spread
 from haploop.tools.cost.findings import effects_sentence, interval
 from haploop.tools.figure import style
@@ -13,7 +14,6 @@ from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.labels import Label, place_labels
 from haploop.tools.linear.stiffness_limit import StiffnessLimit
 from haploop.tools.operations import NONE, WHOLE
-from haploop.tools.render.units import fixed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

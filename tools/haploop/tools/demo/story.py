@@ -11,12 +11,12 @@ from haploop.controller.dissipation import Element
 from haploop.launch.runs import start
 from haploop.launch.runs.in_process import run_in_process
 from haploop.launch.spec import RunFailed, RunSpec
+from haploop.logger.cause import by_trial, cause
 from haploop.logger.summary import Summary
 from haploop.logger.verdict.measures import WINDOW_S
+from haploop.protocol.amounts import amount
 from haploop.protocol.scene.scene import ElementTable
 from haploop.tools.figure.data import RunData
-from haploop.tools.render.cause import by_trial, cause
-from haploop.tools.render.units import amount
 
 # By whether the loop is steady before and after the swap.
 OUTCOME = {

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from haploop.protocol.amounts import prefix_for
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.dissipate.report import buzz_sentence, conclusion, make_row, note_sentences, rows, uneven
 from haploop.tools.dissipate.sentences import MOST_SPANS, buzzing
 from haploop.tools.figure import style
-from haploop.tools.render.units import prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,6 +6,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from haploop.protocol.amounts import amount, fixed
 from haploop.protocol.filled import filled
 from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.scene import Scene
@@ -13,7 +14,6 @@ from haploop.tools.dissipate.force_book import Passivity
 from haploop.tools.dissipate.outcome import EQUAL_N, ElementOutcome, ForceOutcome, Outcome
 from haploop.tools.dissipate.sentences import NEXT, buzz_sentence, filtered_out, low_pass
 from haploop.tools.render.terminal import make_table
-from haploop.tools.render.units import amount, fixed
 
 _PASSIVITY: dict[Passivity, str] = {
     "passive": "it never gave out more than it had taken: passive on this recording",

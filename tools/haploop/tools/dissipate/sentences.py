@@ -6,13 +6,13 @@ import math
 from typing import Any
 
 from haploop.launch.stability.traces import is_felt
+from haploop.protocol.amounts import amount
 from haploop.protocol.filled import filled
 from haploop.tools.dissipate.outcome import Outcome
 from haploop.tools.dissipate.swing.buzz import ABOVE_HZ, LASTS_S, LEAST_RATE_HZ, SLOWER, Buzz, Span, Word
 from haploop.tools.dissipate.swing.course import Course
 from haploop.tools.dissipate.swing.fed import LEAST_FED
 from haploop.tools.dissipate.swing.lines import COUNTS
-from haploop.tools.render.units import amount
 
 _BUZZ: dict[Word, str] = {
     "buzzes": "The recording buzzes: it swings at {frequency}, {width} peak to peak at most, {when}; "

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from haploop.launch.plan.effects import notes
+from haploop.protocol.amounts import amount, prefix_for
 from haploop.tools.figure import style
 from haploop.tools.figure.data import Book, FigureError, RunData
 from haploop.tools.figure.run_figure import badge, failure, key_numbers
@@ -16,7 +17,6 @@ from haploop.tools.figure.run_labels import labels
 from haploop.tools.figure.run_names import run_names, shortened
 from haploop.tools.figure.time import MM, line
 from haploop.tools.render.report import noted
-from haploop.tools.render.units import amount, prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from haploop.protocol.amounts import prefix_for
 from haploop.tools.figure import style
 from haploop.tools.figure.time import line, mark_events
-from haploop.tools.render.units import prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.figure import SubFigure

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from haploop.launch.plan.effects import notes
+from haploop.protocol.amounts import amount
 from haploop.tools.figure import style
 from haploop.tools.figure.data import TOGETHER, Book, RunData
 from haploop.tools.figure.event_words import event_words
@@ -23,7 +24,7 @@ from haploop.tools.render.report import (
     swing_words,
 )
 from haploop.tools.render.terminal import told
-from haploop.tools.render.units import amount, parameters, spring
+from haploop.tools.render.units import parameters, spring
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from haploop.protocol.amounts import prefix_for
 from haploop.tools.figure import style
 from haploop.tools.figure.data import Book, Floats, RunData
-from haploop.tools.render.units import prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

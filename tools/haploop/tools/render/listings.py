@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
+from haploop.protocol.amounts import amount
 from haploop.tools.render.report import lateness_rows, program_rows
 from haploop.tools.render.terminal import make_table, seen, verdict_style
-from haploop.tools.render.units import amount
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

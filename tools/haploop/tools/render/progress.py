@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self
 
+from haploop.protocol.amounts import amount, fixed
 from haploop.tools.render.terminal import console, seen, verdict_style
-from haploop.tools.render.units import amount, fixed
 
 if TYPE_CHECKING:
     from rich.console import Console

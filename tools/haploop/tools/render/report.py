@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 from haploop.launch.foreign import described
 from haploop.launch.scene.mistakes import counted
-from haploop.tools.render.cause import SWINGS, by_trial, likely_cause
+from haploop.logger.cause import SWINGS, by_trial, likely_cause
+from haploop.protocol.amounts import amount, fixed
 from haploop.tools.render.terminal import console, make_facts, make_table, told, verdict_style
-from haploop.tools.render.units import NO_UNITS, amount, fixed, parameters, spring
+from haploop.tools.render.units import NO_UNITS, parameters, spring
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

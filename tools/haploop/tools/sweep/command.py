@@ -16,11 +16,11 @@ from haploop.launch.processes.children import interrupts
 from haploop.launch.spec import PLUGINS, OutputError, keep_plugin, kept_name, make_output
 from haploop.logger.log import LogError
 from haploop.logger.summary import Summary, read, write
+from haploop.protocol.amounts import fixed
 from haploop.tools.command.options import FAILED, WRONG_USE, leave, note_without_numba, plain_errors, print_json
 from haploop.tools.executor.executors import ExecutorError
 from haploop.tools.executor.pool import Pool, read_sources
 from haploop.tools.machine import machine, versions
-from haploop.tools.render.units import fixed
 from haploop.tools.sweep.engine import Engine, Stopped, SweepProgress, describe_counts
 from haploop.tools.sweep.record import wants_trajectories
 from haploop.tools.sweep.store import Store, StoreError

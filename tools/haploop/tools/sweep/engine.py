@@ -9,10 +9,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Sized
 from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any, Self
 
+from haploop.protocol.amounts import fixed
 from haploop.tools.executor.pool import Group, Pool, Stop
 from haploop.tools.executor.work import Work
 from haploop.tools.render.terminal import console
-from haploop.tools.render.units import fixed
 from haploop.tools.sweep.boundary import Boundary, Candidate, find_boundaries, verdict_is
 from haploop.tools.sweep.cells import Axis, Bisect, Extra, Item, Sweep
 from haploop.tools.sweep.record import VERDICT, wants_energy, wants_trajectories

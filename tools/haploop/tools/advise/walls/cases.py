@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from haploop.plant.chain.chain import Chain
+from haploop.protocol.amounts import amount
 from haploop.protocol.scene.hand_force import Constant, Sine, constant_from_s
 from haploop.protocol.scene.paths import value_at, with_value
 from haploop.protocol.scene.scene import Hand, Scene, Wall
 from haploop.tools.advise.walls.corners import Corner, Ranges, corner_words, design, drawn, scale_quantities
-from haploop.tools.render.units import amount
 
 # The device meets the wall at this speed, a firm tap; in an attack also at those of a slow press and of the fastest tap
 # measured.

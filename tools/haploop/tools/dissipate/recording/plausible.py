@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from haploop.protocol.amounts import amount
 from haploop.tools.dissipate.recording.samples import Floats
-from haploop.tools.render.units import amount
 
 # Time over which velocities are taken, s: from sample to sample an encoder's counts look faster than any hand.
 _OVER_S = 0.01

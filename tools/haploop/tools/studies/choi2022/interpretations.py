@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from haploop.tools.render.units import amount
+from haploop.protocol.amounts import amount
 from haploop.tools.search import random
 from haploop.tools.search.intervals import Interval, share_interval
 from haploop.tools.search.random import Effort, Evaluate, Group, Point, Row, Space, random_search

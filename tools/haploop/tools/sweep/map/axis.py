@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from haploop.launch.scene.toml_writer import inline
+from haploop.protocol.amounts import prefix_for
 from haploop.tools.figure.style import FAINT, GREY, INK, SMALL, TEXT, plain_numbers
-from haploop.tools.render.units import prefix_for
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

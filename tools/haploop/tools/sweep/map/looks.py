@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from haploop.protocol.amounts import amount
 from haploop.tools.figure.style import GREY
 from haploop.tools.figure.style import VERDICTS as COLOURS
-from haploop.tools.render.units import amount
 from haploop.tools.sweep.map.data import Verdict
 
 if TYPE_CHECKING:

@@ -18,8 +18,9 @@ export function showSummary(state) {
   panel.replaceChildren(
     make("h2", { id: "summary-title" }, `${summary.ended === "failed" ? "Failed" : "Ended"}: ${told(state) ?? NONE}`),
     make("p", { class: "about" }, (isJudged(state) ? summary.verdict_rule : state.sight?.why) ?? ""),
+    make("p", { id: "cause" }, state.cause ?? ""),
     make("p", { class: "balance" }, summary.energy?.balance ?? ""),
-    rows({ ...pushed(summary.stability ?? {}), ...tried(summary.stability?.without), ...figures(summary, state.was_paused), ...foreign(summary.programs) }),
+    rows({ ...pushed(summary.stability ?? {}), ...figures(summary, state.was_paused), ...foreign(summary.programs) }),
     books(summary.energy ?? {}),
     make("p", { class: "about" }, "In ", make("code", {}, out)),
   );
@@ -41,11 +42,6 @@ function pushed({ rate_1_s: rate, error_1_s: error, ...found }) {
     ...(found.frictionless ? { "without its friction": found.frictionless } : {}),
     ...(isNumber(found.own_share) ? { "its share of the run's swing": share(found.own_share) } : {}),
   };
-}
-
-/** What the loop does without each of its parts, of a loop that swings or diverged. */
-function tried(without) {
-  return Object.fromEntries(Object.entries(without ?? {}).map(([part, does]) => [`without ${part}`, does]));
 }
 
 const share = (own) => (own < 0.01 ? "less than 1 %" : `${Math.round(100 * own)} %`);

@@ -11,10 +11,10 @@ import numpy as np
 from haploop.controller.dissipation import registry
 from haploop.launch.runs.in_batch import run_batch
 from haploop.logger.summary import Summary
+from haploop.protocol.amounts import amount
 from haploop.protocol.scene.paths import without
 from haploop.protocol.scene.scene import Encoder, Scene
 from haploop.tools.figure.style import INK, PRESSING, RELEASING, SMALL, TEXT, dress, empty_figure, legend
-from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.figures.claims import Finding
 from haploop.tools.studies.choi2022.figures.drawing import INSIDE, UPPER_LEFT
 from haploop.tools.studies.choi2022.figures.work import Work

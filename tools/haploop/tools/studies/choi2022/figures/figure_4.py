@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from haploop.protocol.amounts import amount, fixed
 from haploop.protocol.scene.effects import Accelerometer
 from haploop.protocol.scene.estimators import Acceleration
 from haploop.protocol.scene.hand_force import Trace
 from haploop.protocol.scene.scene import ElementTable, Encoder, Scene
 from haploop.tools.figure.style import INK, SMALL, empty_figure
 from haploop.tools.linear.one_tick import OneTickMap
-from haploop.tools.render.units import amount, fixed
 from haploop.tools.search.bisect import Tolerance, bisect
 from haploop.tools.studies.choi2022.figures.claims import Finding
 from haploop.tools.studies.choi2022.figures.drawing import draw_momentum

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from haploop.protocol.amounts import amount, fixed
 from haploop.tools.figure.style import GREY, dress, empty_figure, legend, plain_numbers
-from haploop.tools.render.units import amount, fixed
 from haploop.tools.studies.choi2022 import sampled
 from haploop.tools.studies.choi2022.figures.claims import Finding
 from haploop.tools.studies.choi2022.figures.drawing import COLOURS, INSIDE, draw_momentum

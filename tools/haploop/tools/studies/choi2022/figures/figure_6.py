@@ -10,6 +10,7 @@ import numpy as np
 
 from haploop.launch.scene.toml_writer import inline
 from haploop.logger.log.recording import Recording
+from haploop.protocol.amounts import amount
 from haploop.protocol.scene.scene import accelerometer_is_used
 from haploop.protocol.scene.table import Table
 from haploop.tools.figure.style import (
@@ -27,7 +28,6 @@ from haploop.tools.figure.style import (
 from haploop.tools.figure.time import line
 from haploop.tools.linear.one_tick import OneTickMap
 from haploop.tools.render.terminal import told
-from haploop.tools.render.units import amount
 from haploop.tools.search.random import Point
 from haploop.tools.studies.choi2022.figures.claims import HOLDS, RARE_BELOW, Finding
 from haploop.tools.studies.choi2022.figures.drawing import claims_table, columns_of, open_table, search_words

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from haploop.controller.dissipation import registry
+from haploop.protocol.amounts import amount
 from haploop.protocol.ticks import Timebase
 from haploop.tools.dissipate.booking import Booked, Booking
 from haploop.tools.dissipate.recording.samples import Samples
 from haploop.tools.figure.style import dress, empty_figure, legend
-from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.device import FRICTION_N, KINDS, Setup, elements_of
 from haploop.tools.studies.choi2022.experiment import BOOKED_AT_N_M, BOOKED_DAMPING, BOOKED_KG
 from haploop.tools.studies.choi2022.figures.claims import ASSUMING, Finding

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from haploop.logger.summary import Summary
+from haploop.protocol.amounts import amount
 from haploop.protocol.scene.hand_force import Constant, Trace
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.figure.style import ELEMENTS, INK, SMALL, WALL, WALL_FILL, dress, empty_figure, legend
-from haploop.tools.render.units import amount
 from haploop.tools.studies.choi2022.device import KINDS, elements_of
 from haploop.tools.studies.choi2022.experiment import PAIR, PAIR_AT_N_M
 from haploop.tools.studies.choi2022.figures.claims import Finding

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from haploop.tools.render.units import amount
+from haploop.protocol.amounts import amount
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -76,7 +76,7 @@ def likely_cause(summary: Summary) -> str:
     stability, energy = summary.get("stability", {}), summary["energy"]
     without, share = stability.get("without"), stability.get("own_share")
     if without == {}:
-        return _LIKELY.format(_PRESSED_THROUGH)
+        return cause_in_short(summary)
     tried = by_trial(without)
     if tried and share is not None and share < _HALF:
         tried = _SMALL_SHARE.format(share) + tried
@@ -87,6 +87,14 @@ def likely_cause(summary: Summary) -> str:
     hardly_fed = 0.0 < _most_fed_J(energy) < _TELLING * (energy.get("moved_J") or 0.0)
     untried = _NO_TRIALS if summary["verdict"] != "swinging" and stability and not without else ""
     return " ".join(filter(None, ["" if hardly_fed else cause(energy), untried]))
+
+
+def cause_in_short(summary: Summary) -> str:
+    """Returns the first sentence of the likely cause of a swing; "" where no part of the loop was tried."""
+    without = summary.get("stability", {}).get("without")
+    if without is None:
+        return ""
+    return _LIKELY.format(f"{_cause_by_trial(without)}." if without else _PRESSED_THROUGH)
 
 
 def _most_fed_J(energy: Summary) -> float:
