@@ -50,6 +50,8 @@ def test_a_wrong_quantity_is_told_with_the_nearest() -> None:
     result = run(load("fig6c", SHORT))
     with pytest.raises(KeyError, match=r"window.oscilation_m in the summary \(did you mean window.oscillation_m\?\)"):
         result.quantity("window.oscilation_m")
+    with pytest.raises(KeyError, match="no number xyz in the summary; it has seed, "):
+        result.quantity("xyz")
     with pytest.raises(KeyError, match=r"no channel /plnt in this log \(did you mean /plant\?\)"):
         result["/plnt"]
     with pytest.raises(KeyError, match=r"no column forse \(did you mean force\?\)"):
@@ -118,6 +120,10 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
         with pytest.raises(CommandRefused, match="did you mean damping"):
             loop.swap("dampin", damping=1.0)
         tick = loop.swap("unidirectional-inertia", mass="10 g")
+        changed = loop.set({"wall.stiffness": 500})
+        assert loop.undo() == changed
+        loop.set({"wall.stiffness": 500}, at="300 ms")
+        assert loop.undo() is None
         loop.set({"wall.stiffness": "0.2 N/mm"}, at="200 ms")
         live = loop.finish()
         assert loop.wait() is live

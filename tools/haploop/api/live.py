@@ -193,9 +193,9 @@ class LiveLoop:
         table = {"kind": kind, **plain(parameters)}
         return self._ask("swap", swap=table, element=element, at=_seconds(at), reload=reload)["tick"]
 
-    def undo(self) -> None:
-        """Undoes the last swap or set."""
-        self._ask("undo")
+    def undo(self) -> int | None:
+        """Undoes the last swap or set; returns the tick, or None for a change withdrawn before it came into effect."""
+        return self._ask("undo").get("tick")
 
     def pause(self) -> int:
         """Pauses the run at the next tick possible; returns that tick once all before it are done."""

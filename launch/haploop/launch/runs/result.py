@@ -97,7 +97,8 @@ class Result:
 
         known = dict(_numbers(self.summary))
         if key not in known:
-            raise KeyError(f"There is no number {key} in the summary{meant(key, known)}; it has {', '.join(known)}.")
+            near = meant(key, known)
+            raise KeyError(f"There is no number {key} in the summary{near or '; it has ' + ', '.join(known)}.")
         value = known[key]
         return pint.get_application_registry().Quantity(math.nan if value is None else value, unit_of(key))
 

@@ -270,11 +270,11 @@ def _log_file(path: Path) -> Path:
         if path.is_dir():
             log = path / "log.mcap"
         demand_regular(log)
-    except FileNotFoundError as error:
+    except FileNotFoundError:
         what = f"There is no {path}; give the directory of a run or its log.mcap."
         if log != path:
             what = f"The directory {path} holds no log.mcap; it is not the directory of a logged run."
-        raise FileNotFoundError(what) from error
+        raise FileNotFoundError(what) from None
     except OSError as error:
         raise LogError(f"The log {log} cannot be read: {error.strerror}.") from error
     return log
