@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from haploop.logger.verdict.spectrum import amplitudes, main_line
 from haploop.view.look.sight import see
-from haploop.view.look.spectrum import amplitudes, main_line
 from haploop.view.store.history import History
 from helpers.runs.seen import COUNT_M, TIME, deep, history_of, seen, sine
 from helpers.scenes.effect_tables import slowly

@@ -9,6 +9,7 @@ import numpy as np
 
 from haploop.logger.verdict.about_trend import about_trend
 from haploop.logger.verdict.ripple import peak_to_peak, ripple
+from haploop.logger.verdict.spectrum import main_line
 
 WINDOW_S = 0.5
 CROSSINGS = 4
@@ -47,8 +48,9 @@ class Figures(NamedTuple):
         from_s: when the window begins: half a second before the end, or half-way through a run shorter than that.
         oscillation_m: how far the true position moved in the window, peak to peak.
         growth_1_s: the r of e^(r t) by which the swings grow; negative: they decay; None where nothing swings.
-        frequency_Hz: half the number of crossings of the motion's straight trend per second, to 1 Hz; more than the
-            frequency of a swing that crosses it several times a period, as one that bounces; None where nothing swings.
+        frequency_Hz: frequency of the main line in the spectrum of the position at the ticks; where none stands out, or
+            where the swing is too fast for them, half the number of crossings of its straight trend per second, to
+            1 Hz; None where nothing swings.
         outside_fraction: share of the ticks of the window that are out of contact.
         displayed_stiffness_N_m: mean of total force over penetration at the ticks in contact (Choi et al. 2022, V.B.2),
             except those whose penetration is a rounding error of the wall's position; None without such ticks.
@@ -80,13 +82,16 @@ class WindowMeasures(NamedTuple):
 
 
 class MeasuredColumns(NamedTuple):
-    """Measures of the windows of some runs, a list each: the two of ``swings``, width peak to peak, ticks in contact.
+    """Measures of the windows of some runs, a list each: the two of ``swings``, the main line, width peak to peak, and
+    ticks in contact.
 
-    Displayed stiffness and penetration are means over ticks in contact, None without any; forces are of the command.
+    The line is None where nothing swings or no line stands out. Displayed stiffness and penetration are means over
+    ticks in contact, None without any; forces are of the command.
     """
 
     crossings: list[int]
     growth: list[float]
+    line_Hz: list[float | None]
     width_m: list[float]
     inside: list[int]
     stiffness_N_m: list[float | None]
@@ -203,8 +208,13 @@ def measure_window(
     real = inside & (np.abs(depth) > ROUNDING * np.abs(held["wall_position"]))
     with np.errstate(over="ignore"):  # an element may ask for any finite force
         stiffness = np.divide(held["total"], depth, out=np.zeros_like(depth), where=real)
+    crossings, growth = swings(x, swing_m)
+    n = rate // control_rate
+    at_ticks = x[:, ::-1][:, : span.steps // n * n : n][:, ::-1]
     measured = MeasuredColumns(
-        *swings(x, swing_m),
+        crossings,
+        growth,
+        main_lines(at_ticks, control_rate, crossings),
         np.ptp(x, axis=1).tolist() if x.shape[1] else [0.0] * len(x),
         np.count_nonzero(inside, axis=1).tolist(),
         _means(stiffness, real),
@@ -212,17 +222,33 @@ def measure_window(
         ripple(held["total"], control_rate).tolist(),
         peak_to_peak(held["total"]).tolist(),
     )
-    return window_measures(measured, span, rate)
+    return window_measures(measured, span, rate, control_rate)
 
 
-def window_measures(measured: MeasuredColumns, span: Span, rate: int) -> list[WindowMeasures]:
+def main_lines(x: np.ndarray, control_rate: int, crossings: list[int]) -> list[float | None]:
+    """Returns the frequency of the main line of each run's position at its ticks, Hz; None where nothing swings.
+
+    Args:
+        x: positions at the last ticks, shape (runs, ticks), m.
+        control_rate: ticks a second.
+        crossings: those of ``swings``.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        lines = [main_line(row, control_rate) if n >= CROSSINGS else None for row, n in zip(x, crossings, strict=True)]
+    return [line and line.frequency_Hz for line in lines]
+
+
+def window_measures(measured: MeasuredColumns, span: Span, rate: int, control_rate: int) -> list[WindowMeasures]:
     """Returns the measures of each run's window, with the figures of the summary."""
     start_s, seconds = span.first / rate, (span.steps + 1) / rate
     measures = []
-    for crossings, growth, width_m, inside, stiffness_N_m, depth_m, *forces_N in zip(*measured, strict=True):
+    for crossings, growth, line_Hz, width_m, inside, stiffness_N_m, depth_m, *forces_N in zip(*measured, strict=True):
         # A swing that is `growth` times as wide in the second half of the window follows e^(r t).
         rate_1_s = 2.0 * math.log(growth) / seconds if crossings >= CROSSINGS and growth > 0.0 else None
-        frequency_Hz = crossings / (2.0 * seconds) if crossings >= CROSSINGS else None
+        crossed_Hz = crossings / (2.0 * seconds) if crossings >= CROSSINGS else None
+        # What swings faster than half the control rate appears at another frequency in the positions at the ticks.
+        is_slow = crossed_Hz is not None and 2.0 * crossed_Hz <= control_rate
+        frequency_Hz = line_Hz if line_Hz and is_slow else crossed_Hz
         outside = (span.ticks - inside) / span.ticks if span.ticks else 1.0
         figures = Figures(start_s, width_m, rate_1_s, frequency_Hz, outside, stiffness_N_m, depth_m, *forces_N)
         measures.append(WindowMeasures(inside > 0, crossings, growth, figures))

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from haploop.logger.verdict.spectrum import amplitudes, main_line
 from haploop.protocol.walls.registry import make_wall
 from haploop.protocol.walls.wall import Spring
 from haploop.view.draw.messages import Column, Table
 from haploop.view.draw.over_time import Interval, are_there, by_place, own_columns
 from haploop.view.look.budget import budget
 from haploop.view.look.compare import Changes, Half
-from haploop.view.look.spectrum import amplitudes, main_line
 from haploop.view.store.history import History
 from haploop.view.store.lod_series import LodSeries
 

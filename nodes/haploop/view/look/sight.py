@@ -9,8 +9,8 @@ import numpy as np
 
 from haploop.logger.verdict.about_trend import about_trend
 from haploop.logger.verdict.measures import CROSSINGS, ROUNDING, SMALLEST_SWING_M, WINDOW_S, swings
+from haploop.logger.verdict.spectrum import main_line
 from haploop.protocol.filled import filled
-from haploop.view.look.spectrum import main_line
 from haploop.view.store.history import History
 
 # A slow swing, or one that has just ended, is looked for in this many windows; growth and decay are reported beyond

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from haploop.controller.dissipation import Element, Quantity
+from haploop.logger.verdict.spectrum import Line
 from haploop.protocol.amounts import amount
 from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.dissipate.booking import Booking
@@ -19,7 +20,6 @@ from haploop.tools.dissipate.swing.buzz import Buzz, Overtone, Several, Word
 from haploop.tools.dissipate.swing.finder import BuzzFinder
 from haploop.tools.dissipate.swing.hidden import Hidden
 from haploop.tools.dissipate.trace import Trace
-from haploop.view.look.spectrum import Line
 
 # Both have a name, the control period and the delay of the forces in s, ``between`` (what the motion between samples is
 # taken from), ``recorded`` (which of "velocity" and "acceleration" are not estimated), ``has_force``, and notes, which

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 _ITS_WORD = "Only the {} itself says that it does what the scene says; haploop replay checks it against the scene."
 _TRIED = "with the hand's force of {}, pushed by up to {}; haploop advise tries taps, other holds and devices"
 _LIMITED = "; of the command: the actuator gave less at times"
-# Frequencies that differ by no more than this share, or by this much, which is how finely crossings tell them, are one.
-_ALIKE, _COARSE_HZ = 0.15, 1.5
-_AT, _CROSSED = ", at about {0} Hz", ", through its mean {0} times a second"
+# Frequencies that differ by no more than this share are told once, as that of the pushed loop, which is more exact.
+_ALIKE = 0.15
+_AT = ", at about {0} Hz"
 _NOTE = "A note on its scene: {first}"
 _NOTES = "{count} notes on its scene; the first: {first}"
 # Entries of the summary's window, their words, and what stands after the number. Peaks of two swings do not add.
@@ -67,17 +67,11 @@ def limited(summary: Summary) -> str:
 
 
 def how_often(summary: Summary) -> str:
-    """Returns how often a swing went to and fro at its end; "" where it did not, or where its frequency is told anyway.
-
-    Half its crossings a second are its frequency, to 1 Hz, unless it crosses its mean more often than once in half a
-    period, as what bounces on a wall does. The frequency of the pushed loop, which is told, is more exact.
-    """
-    if not (crossed_Hz := summary["window"].get("frequency_Hz")):
+    """Returns the frequency of a run's last swing; "" where there is none, or that of the pushed loop is alike."""
+    if not (seen_Hz := summary["window"].get("frequency_Hz")):
         return ""
-    if not (pushed_Hz := summary.get("stability", {}).get("frequency_Hz")):
-        return _AT.format(fixed(crossed_Hz, 0))
-    is_same = abs(crossed_Hz - pushed_Hz) <= max(_ALIKE * pushed_Hz, _COARSE_HZ)
-    return "" if is_same else _CROSSED.format(fixed(2.0 * crossed_Hz, 0))
+    pushed_Hz = summary.get("stability", {}).get("frequency_Hz") or 0.0
+    return "" if abs(seen_Hz - pushed_Hz) <= _ALIKE * pushed_Hz else _AT.format(fixed(seen_Hz, 2))
 
 
 def displayed_stiffness(summary: Summary) -> float | None:

@@ -11,7 +11,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from haploop.launch.batch.jax.block import Rings
-from haploop.logger.verdict.measures import ROUNDING, MeasuredColumns, RunMeasures, window_measures, window_span
+from haploop.logger.verdict.measures import (
+    ROUNDING,
+    MeasuredColumns,
+    RunMeasures,
+    main_lines,
+    window_measures,
+    window_span,
+)
 from haploop.logger.verdict.ripple import peak_to_peak, ripple
 from haploop.logger.verdict.window import TOGETHER, Window, keep_steps, last_rows
 
@@ -45,15 +52,16 @@ class CompiledWindow(Window):
         found = _look(self.rings.x, rows, np.int64(steps), self.swing_m, steps=span.steps + 1, ticks=span.ticks)
         crossings, growth, width, inside, *means = (np.asarray(column)[wanted].tolist() for column in found)
         stiffness, depth = _where_any(*means[:2]), _where_any(*means[2:])
-        # Done once a run: a transform by NumPy costs less than a program for it.
+        # Done once a run: transforms by NumPy cost less than a program for them.
+        at_ticks = last_rows(np.asarray(self.rings.x)[:, -1], steps // n, wanted)[:, -(span.steps // n) :]
+        lines = main_lines(at_ticks, self._time.control_rate, crossings)
         command = last_rows(np.asarray(self.rings.rows["total"]), steps // n, wanted)[:, -span.ticks :]
         parts = [command[first : first + TOGETHER] for first in range(0, len(command), TOGETHER)]
         ripples = np.concatenate([ripple(part, self._time.control_rate) for part in parts])
         forces = ripples.tolist(), peak_to_peak(command).tolist()
-        measured = MeasuredColumns(crossings, growth, width, inside, stiffness, depth, *forces)
-        yield from map(
-            RunMeasures, window_measures(measured, span, rate), self.extremes(wanted), self.swing_m[wanted].tolist()
-        )
+        measured = MeasuredColumns(crossings, growth, lines, width, inside, stiffness, depth, *forces)
+        windows = window_measures(measured, span, rate, self._time.control_rate)
+        yield from map(RunMeasures, windows, self.extremes(wanted), self.swing_m[wanted].tolist())
 
 
 def _where_any(counts: list[int], means: list[float]) -> list[float | None]:
@@ -71,7 +79,9 @@ class _Swings(NamedTuple):
 
 @partial(jax.jit, static_argnames=("steps", "ticks"))
 def _look(x: Any, rows: dict[str, jax.Array], ran: Any, swing_m: Any, *, steps: int, ticks: int) -> list[Any]:
-    """Returns the columns of ``MeasuredColumns`` but the last two, with counts before means; see ``measure_window``.
+    """Returns the columns of ``MeasuredColumns`` but the line and the last two, with counts before means.
+
+    See ``measure_window``.
 
     Args:
         x: positions, shape (ticks kept, n, members); rows: ``CONTROLLER_COLUMNS``, shape (ticks kept, members).

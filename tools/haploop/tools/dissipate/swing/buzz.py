@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
+from haploop.logger.verdict.spectrum import Line
 from haploop.tools.dissipate.swing.course import Course
 from haploop.tools.dissipate.swing.fed import LEAST_FED
-from haploop.view.look.spectrum import Line
 
 # Slower swings are a hand's: voluntary ones end at some 8 Hz, tremor at 12 Hz.
 ABOVE_HZ = 15.0

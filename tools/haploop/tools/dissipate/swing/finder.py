@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from haploop.logger.verdict.spectrum import Line, amplitudes, main_line
 from haploop.tools.dissipate.recording.samples import Floats, Samples
 from haploop.tools.dissipate.swing.buzz import (
     FAST,
@@ -23,7 +24,6 @@ from haploop.tools.dissipate.swing.lasting import HOPS, NEEDED, lasting, make_bu
 from haploop.tools.dissipate.swing.lines import Slower, fast_rms_m, overtone_of, swing, within_counts
 from haploop.tools.dissipate.swing.several import SeveralFinder
 from haploop.tools.dissipate.swing.windows import End, Window, widest_m
-from haploop.view.look.spectrum import Line, amplitudes, main_line
 
 # A swing continues to the end of a part if it lasts through its last half second with at least this share of the width
 # in the window before.

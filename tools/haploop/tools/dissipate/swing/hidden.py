@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from haploop.logger.verdict.spectrum import Line
 from haploop.tools.dissipate.swing.buzz import Band
-from haploop.view.look.spectrum import Line
 
 # This many windows in a row, a quarter of a window apart, are a swing that lasts.
 _LASTS = 5

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from haploop.launch.stability.traces import is_felt
+from haploop.logger.verdict.spectrum import Line, line_at, lobe, main_line
 from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.dissipate.swing.buzz import FAST, Band
-from haploop.view.look.spectrum import Line, line_at, lobe, main_line
 
 # Most swings at once; least share of the variance of each, and least distance of peaks, in lines.
 _MOST, _OF_EACH, _APART = 3, 0.1, 2

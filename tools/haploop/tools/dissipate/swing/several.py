@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from haploop.logger.verdict.spectrum import Line
 from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.dissipate.swing.buzz import FAST, Overtone, Several
 from haploop.tools.dissipate.swing.lines import Slower, Spectrum, is_overtone, swings
-from haploop.view.look.spectrum import Line
 
 # This many windows in a row, a quarter of a window apart, last a second.
 _LASTS = 5

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from haploop.logger.verdict.spectrum import Line
 from haploop.tools.dissipate.recording.samples import Floats
 from haploop.tools.dissipate.swing.course import PLACES, Widths
-from haploop.view.look.spectrum import Line
 
 # Places in the middle quarter of a window; those up to its end, and those from its beginning on.
 _MIDDLE = slice(3 * PLACES // 8, 5 * PLACES // 8)
