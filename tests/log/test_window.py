@@ -135,6 +135,7 @@ def test_of_a_swing_without_a_main_line_the_frequency_is_half_its_crossings_a_se
         return -0.061 + 1e-4 * np.sin(2.0 * np.pi * lines[:, None] * t).sum(axis=0)
 
     hertz = judged(moving)[1].frequency_Hz
+    assert hertz is not None
     assert 2.0 * hertz * 0.5001 == pytest.approx(round(2.0 * hertz * 0.5001))
     assert 100.0 < hertz < 300.0
 

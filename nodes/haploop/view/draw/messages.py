@@ -116,12 +116,12 @@ def state(session: RunSession) -> Message:
     elements, wall = history.at_work
     session.changes.note(history, session.events)
     sight = session.changes.sight(history)
-    swings = bool(summary) and summary["verdict"] in SWINGS
+    swung = summary if summary and summary["verdict"] in SWINGS else None
     why = session.why or _NO_VERDICT.get(session.verdict_is, "")
     message: Message = {
         "type": "state",
         "phase": session.outcome or ("paused" if status.get("paused") else "running"),
-        "why": why or (cause_in_short(summary) if swings else ""),
+        "why": why or (cause_in_short(swung) if swung else ""),
         "verdict_is": session.verdict_is,
         "run": session.run.id,
         "title": session.scene.title,
@@ -150,7 +150,7 @@ def state(session: RunSession) -> Message:
         "limit_N_m": None if isinstance(session.clock.limit, str) else session.clock.limit,
         "no_limit": session.clock.limit if isinstance(session.clock.limit, str) else "",
         "summary": summary,
-        "cause": likely_cause(summary) if swings else "",
+        "cause": likely_cause(swung) if swung else "",
         "sight": sight and dataclasses.asdict(sight),
         "hand_moves": sight is not None and _hand_moves(session.scene, sight.from_s),
     }
