@@ -75,6 +75,8 @@ def test_elements_on_a_recorded_motion_take_what_the_formula_says(tmp_path: Path
     assert dissipate(recording, damping=2.0).elements[0].true_J == damping.true_J
     assert dissipate(recording, damping="2 N s/m").elements[0].true_J == damping.true_J
     assert len(dissipate(recording, damping=np.array([1.0, 2.0])).elements) == 2
+    for values in ({"velocity.cutoff": "50 Hz"}, ["velocity.cutoff=50"]):
+        assert dissipate(recording, damping=2.0, values=values).scene.estimate("velocity").cutoff == 50.0
 
 
 @pytest.mark.slow
@@ -130,6 +132,10 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
         assert other.wait(PATIENCE_S).summary == live.summary
         with pytest.raises(RunNotFound):
             loop.pause()
+    with start("fig6b", pace=0.01) as left:
+        pass
+    with pytest.raises(RunNotFound, match=r"was ended with its with block .* start\(scene, out=\.\.\.\)"):
+        left.wait()
     with start("fig6b", pace=0.01) as slow, pytest.raises(TimeoutError, match=r"is still running after 0\.01 s"):
         slow.wait(0.01)
     written = scene.swap("unidirectional-inertia", at=tick * 1e-3, mass=0.01).set({"wall.stiffness": 200}, at=0.2)

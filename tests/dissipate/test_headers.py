@@ -32,6 +32,8 @@ def recorded(folder: Path, *above: str, rows: list[str] = ROWS, mark: str = ",")
         ("bench of Monday", "Time (ms),Position (mm)"),
         ("Recorder,bench,of Monday", "Separator,Comma", "t (ms),x (mm)"),
         ("# written by a scope", "t (ms),x (mm)"),
+        (*["# note"] * 60, "t (ms),x (mm)"),
+        (*["# note"] * 60, "# t_ms,x_mm"),
     ],
 )
 def test_a_title_is_left_out_and_a_row_of_units_read(

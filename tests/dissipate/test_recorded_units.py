@@ -41,16 +41,16 @@ def test_units_come_from_the_header_or_are_given(
         ("v_mm/s", "mm/s"),
         ("a_m/s^2", "m/s^2"),
         ("F_mN", "mN"),
-        ("v_m_s", ""),
-        ("v_mm_s", ""),
+        ("v_m_s", "m/s"),
+        ("tip_v_mm_s", "mm/s"),
+        ("a_mm_s2", "mm/s2"),
+        ("x_mm_V", ""),
         ("x_mm_filtered", ""),
         ("x_M", ""),
         ("_m", ""),
     ],
 )
-def test_a_unit_after_an_underscore_is_one_unless_it_is_the_end_of_a_quotient_or_of_another_name(
-    head: str, unit: str
-) -> None:
+def test_a_unit_after_an_underscore_is_one_unless_another_word_follows(head: str, unit: str) -> None:
     assert name_and_unit(head) == (head, unit)
 
 

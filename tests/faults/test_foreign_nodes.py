@@ -15,7 +15,7 @@ from haploop.launch.foreign import Program, ProgramError, check_wait, read_progr
 from haploop.launch.processes.run_directory import CommandRefused
 from helpers.live.foreign import PLAIN, Started
 from helpers.live.in_process import ask
-from helpers.live.launched import BRIEF, BRIEF_S, SCENE, same_bits
+from helpers.live.launched import BRIEF, BRIEF_S, SCENE
 from helpers.live.system import processes
 from helpers.live.waiting import wait_for
 from helpers.slowly import first_and_slowly
@@ -65,7 +65,7 @@ def test_however_a_foreign_controller_fails_the_run_ends_names_it_and_keeps_its_
     run.end(1)
     assert words in run.stderr
     assert "plain_controller.py" in run.stderr or how == "nan"
-    assert same_bits(run.log(), run.log()) > 100
+    assert len(run.log()["/plant"]["x"]) > 100
     summary = json.loads((run.out_directory / "summary.json").read_text())
     assert summary["ended"] == "failed"
     assert summary["programs"]["controller"]["name"] == "plain controller"

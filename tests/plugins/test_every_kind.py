@@ -25,8 +25,9 @@ from haploop.protocol.register import UnknownKind
 from haploop.protocol.scene.hand_force import HandForce
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.walls.registry import make_wall, wall_class
+from haploop.tools.advise.walls.cases import hold_N, make_loop
 from haploop.tools.command.given import kinds_with
-from haploop.tools.executor.pool import Pool
+from haploop.tools.executor.pool import Pool, read_sources
 from haploop.tools.figure.data import RunData
 from haploop.tools.figure.run_figure import draw, make_figure
 from helpers.runs.batches import together
@@ -81,6 +82,37 @@ def written(directory: Path, tables: list[str], code: str) -> tuple[Path, Path]:
 
 def with_all(directory: Path, code: str = ALL) -> tuple[Path, Path]:
     return written(directory, [*TABLES, '[[dissipation]]\nkind = "brake"\n'], code)
+
+
+PULSE = """
+import numpy as np
+from typing import Annotated
+from haploop.protocol.quantity import si
+from haploop.protocol.scene.hand_force import HandForce
+class Pulse(HandForce):
+    kind = "pulse"
+    peak: Annotated[float, si("N", "least and last force")]
+    def force_at(self, t): return np.where(t < 0.1, 0.2 * self.peak, self.peak)
+    def constant_from_s(self): return 0.1
+"""
+
+
+def test_a_hand_force_that_is_constant_from_a_time_on_needs_no_value_to_be_checked_and_advised_on(
+    tmp_path: Path,
+) -> None:
+    scene, plugin = written(tmp_path, ['[hand.force]\nkind = "pulse"\npeak = -0.7\n'], PULSE)
+    loaded = load(scene, plugins=[plugin])
+    assert loaded.notes == load(written(tmp_path, [], PULSE)[0]).notes
+    assert hold_N(make_loop(loaded.scene, has_task=True)) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize("text", ["utf-8", "utf-8-sig"])
+def test_a_plugin_file_may_begin_with_a_byte_order_mark(tmp_path: Path, text: str) -> None:
+    scene, plugin = written(tmp_path, ['[[dissipation]]\nkind = "brake"\n'], "")
+    plugin.write_text("from haploop.controller.dissipation import Element\n" + ELEMENT, encoding=text)
+    prepared = prepare(scene, plugins=[plugin], out=tmp_path / text)
+    assert start(prepared)["ended"] == "done"
+    assert len(read_sources([plugin])) == 1
 
 
 def test_the_page_has_a_wall_an_estimator_and_a_hand_force() -> None:

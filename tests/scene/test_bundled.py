@@ -105,6 +105,15 @@ def test_a_scene_that_could_not_be_written_whole_is_not_left_behind():
     assert call("new", "first.toml", "--device", "premium15").exit_code == 0
 
 
+def test_a_scene_that_cannot_be_made_leaves_the_file_that_is_there_as_it_is():
+    Path("mine.toml").write_text("duration = 1", encoding="utf-8")
+    refused = call("new", "mine.toml", "--device", "d" * 300)
+    assert refused.exit_code == 2
+    assert refused.stderr.endswith("cannot be read: File name too long.\n")
+    assert call("new", "mine.toml", "--device", "premium15").exit_code == 2
+    assert Path("mine.toml").read_text(encoding="utf-8") == "duration = 1"
+
+
 @pytest.mark.parametrize(
     ("name", "told"),
     [

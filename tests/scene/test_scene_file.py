@@ -1,16 +1,19 @@
 """Scene files: what extends what, who said what, and files that cannot be read."""
 
+import pickle
 import re
 import tomllib
 
 import pytest
 
+from haploop.controller.tick import NoForce
 from haploop.launch.scene.bundled import bundled_folder
 from haploop.launch.scene.file import load
-from haploop.launch.scene.mistakes import SceneError
+from haploop.launch.scene.mistakes import Mistake, SceneError
 from haploop.launch.scene.reading.lines import outline
 from haploop.protocol.scene.hand_force import Constant, Sine
 from haploop.protocol.scene.scene import Device, Hand, Wall
+from haploop.tools.sweep.points import AxisError
 from helpers.scenes.least import LEAST_TOML, file_mistakes
 
 
@@ -210,6 +213,15 @@ def test_beside_a_file_that_is_absent_the_mistakes_of_the_others_are_told_and_no
     found = file_mistakes(files(top=wrong, below='duration = "1 m"\n[wall]\nstiffnes = 3\n'))
     assert sorted(line.split()[0] for line in found) == ["below.toml:1:", "below.toml:3:", "top.toml:1:", "top.toml:2:"]
     assert [word for line in found if (word := "is missing") in line] == []
+
+
+def test_mistakes_come_whole_out_of_another_process():
+    refused = SceneError([Mistake("a.toml", "wall.stifness", "is not a key of [wall]", "", "stiffness", 3)])
+    again = pickle.loads(pickle.dumps(refused))
+    assert (str(again), again.mistakes) == (str(refused), refused.mistakes)
+    for error in (NoForce(1), AxisError("It must be so.", "is not", "that", 2)):
+        again = pickle.loads(pickle.dumps(error))
+        assert (str(again), vars(again)) == (str(error), vars(error))
 
 
 @pytest.mark.parametrize("value", ['"3 N/mm', "'3 N/mm", '["a", "b]', '"""3'])

@@ -119,8 +119,7 @@ def test_explain_gives_one_json_object():
 
 
 @pytest.mark.parametrize("name", ["fig6b", "premium_press", "all_effects", "accuracy/stick_slip"])
-def test_explain_fits_eighty_columns_and_shows_brackets_as_they_are(name, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
+def test_explain_fits_a_hundred_columns_of_a_pipe_and_shows_brackets_as_they_are(name):
     told = CliRunner().invoke(app, ["explain", name]).stdout
     assert max(map(len, told.splitlines())) <= 100
     assert "[friction]" in told or name != "all_effects"

@@ -24,10 +24,6 @@ _TURNS = ("JOIN", "READY", "ENDED", "DONE", "FAILED")
 _BLOCKS = ("PLANT_BLOCK", "CONTROLLER_BLOCK", "ENERGY_BLOCK")
 
 
-class Violation(Exception):
-    """Raised where a promise is broken; the message says which, and by whom."""
-
-
 def name_of(data: bytes) -> str:
     """Returns the name of the message in a frame, by its first bytes; "" for none."""
     return BY_CODE.get(data[2], "") if len(data) > 2 and data[0] & 0xF0 == 0x90 and data[1] == VERSION else ""

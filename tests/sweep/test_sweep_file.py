@@ -52,6 +52,13 @@ def test_every_combination_is_a_cell_once_with_the_seeds_after_that_of_the_scene
     assert {seed for _, seed in seen} == {7, 8, 9}
 
 
+def test_seeds_that_an_axis_gives_are_not_drawn_again(tmp_path: Path) -> None:
+    axes = "[axes]\nseed = [1, 2]\n"
+    assert loaded(tmp_path, axes).count == 2
+    with pytest.raises(SceneError, match=r"repeat is 3\. It draws seeds, and so does the axis seed; leave one"):
+        loaded(tmp_path, "repeat = 3\n" + axes)
+
+
 def test_the_scene_of_a_cell_is_the_base_but_for_its_values_and_seed(tmp_path: Path) -> None:
     made = loaded(tmp_path, "repeat = 2\n" + GRID)
     cell = made.number({"wall.stiffness": 2, "dissipation.0.damping": 4}, 1)

@@ -61,8 +61,11 @@ class NoForce(Exception):
     """An element gave no force; ``index`` is its place among the active ones. Raised from what it raised."""
 
     def __init__(self, index: int) -> None:
-        super().__init__(f"Element {index} gave no force.")
+        super().__init__(index)
         self.index = index
+
+    def __str__(self) -> str:
+        return f"Element {self.index} gave no force."
 
     def sentence(self, params: ControllerParams, tick: int) -> str:
         """Returns what happened at this tick, with the element's kind and what it raised."""

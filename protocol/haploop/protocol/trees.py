@@ -22,16 +22,23 @@ T = TypeVar("T")
 def tree_map(function: Callable[..., Any], tree: T, *rest: Any) -> T:
     """Returns the tree with ``function(leaf, *leaves of the rest at the same place)`` in place of every leaf.
 
-    Raises ValueError where a node of the rest has a different number of children.
+    Raises ValueError where a node of the rest has a different number of children, or a dict other keys.
     """
     children = _children(tree)
     if children is None:
         return function(tree, *rest)
-    others = [_children(other) for other in rest]
+    others = [_children(_in_order(tree, other)) for other in rest]
     if any(other is None or len(other) != len(children) for other in others):
         raise ValueError(f"The trees differ in structure at a node of type {type(tree).__name__}.")
     columns = zip(children, *(other or [] for other in others), strict=True)
     return _rebuilt(tree, [tree_map(function, *column) for column in columns])
+
+
+def _in_order(tree: Any, other: Any) -> Any:
+    """Returns another dict in the order of the keys of a dict; as it is where their keys differ, None for no node."""
+    if isinstance(tree, dict) and isinstance(other, dict):
+        return [other[key] for key in tree] if other.keys() == tree.keys() else []
+    return other
 
 
 def tree_leaves(tree: Any) -> list[Any]:

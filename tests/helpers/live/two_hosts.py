@@ -55,13 +55,12 @@ class Wire:
     Attributes:
         by: what delays and loses packets.
         is_cut: whether nothing gets through.
-        carried: number of packets carried so far.
     """
 
     def __init__(self, ends: tuple[int, int], delay_s: float, loss: float, is_by_netem: bool = False) -> None:
         self.by = "tc netem" if is_by_netem else "a thread, since this kernel has no netem"
         self.delay_s, self.loss, self.is_cut = (0.0, 0.0, False) if is_by_netem else (delay_s, loss, False)
-        self.carried = self._lost = 0
+        self._lost = 0
         self._ends, self._over, self._draw = ends, False, random.Random(1)
         self._thread = threading.Thread(target=self._carry, daemon=True)
         self._thread.start()
@@ -83,7 +82,6 @@ class Wire:
                 if not self.is_cut:
                     with contextlib.suppress(OSError):
                         os.write(other, packet)
-                        self.carried += 1
 
     @property
     def lost(self) -> int:

@@ -33,6 +33,10 @@ from haploop.protocol.quantity import Quantity
 _LOOK_S, _ENDS_WITHIN_S, _TOLD = 0.01, 20.0, "told.txt"
 # Pace, in simulated seconds per second, of a run that is to stand still at its start: no tick after the first is due.
 _STANDING = 1e-6
+_LEFT = (
+    "The run {} was ended with its with block and kept no files; call finish() or wait() inside the block, or give a "
+    "directory: start(scene, out=...)."
+)
 _PAUSED = (
     "The run {0} is paused at tick {1} and does not end by itself: resume() continues it, finish() continues it "
     "and waits for its end."
@@ -254,11 +258,14 @@ class LiveLoop:
             TimeoutError: the run is still going after this time.
             CommandRefused: the run stands still when the wait begins, and would not end unless resumed.
             RunFailed: the run could not continue.
-            RunNotFound: the run is on another host, so its files are not on this machine.
+            RunNotFound: the run is on another host, so its files are not on this machine, or it kept none and its
+                ``with`` block has been left.
         """
         started, run = self._started, self._run
         if self._result:
             return self._result
+        if started and not Path(run.out).exists():
+            raise RunNotFound(_LEFT.format(run.id))
         if not started and not run.is_here:
             raise RunNotFound(f"The run at {self.id} keeps its files on its own host; wait for its end there.")
         with contextlib.suppress(RunNotFound):  # it has ended

@@ -152,7 +152,7 @@ def dissipate(
     wall: float | str | None = None,
     occupies: str = "below",
     delay_s: float | None = None,
-    values: Iterable[str] = (),
+    values: Values = (),
     plugins: Plugins = (),
     **columns: Any,
 ) -> Outcome:
@@ -166,7 +166,7 @@ def dissipate(
         wall: where a wall begins, in m or text with a unit: elements act only beyond it; ``occupies`` says on which
             side of it the wall is.
         delay_s: age of a force when it acts; that of the run when None.
-        values: ``KEY=VALUE`` for [velocity], [acceleration] and [encoder].
+        values: of [velocity], [acceleration] and [encoder], by dotted key or as ``KEY=VALUE``.
         columns: columns of a text file: position, time, velocity, acceleration, force by name or number; rate_Hz; the
             units as length, time_unit, velocity_unit, acceleration_unit, force_unit.
 
@@ -182,9 +182,10 @@ def dissipate(
 
     dampings, masses = _texts(damping), _texts(mass)
     place = None if wall is None else str(plain(wall))
-    selection = Selection(dampings, masses, list(elements), place, occupies, list(values))
+    selection = Selection(dampings, masses, list(elements), place, occupies, texts(values))
     request = Request(Path(recording), selection, Layout(**columns), delay_s)
-    return compute_outcome(request, registry([Path(plugin) for plugin in plugins]))
+    with mistakes_of_python():
+        return compute_outcome(request, registry([Path(plugin) for plugin in plugins]))
 
 
 def _texts(amounts: Amounts) -> list[str]:

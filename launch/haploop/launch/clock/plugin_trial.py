@@ -45,7 +45,7 @@ def read_source(path: Path) -> str:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode) or status.st_size > _LARGEST:
             raise PluginError(f"The plugin {path} does not load: a Python file of at most 1 MiB was expected.")
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
         raise PluginError(f"The plugin {path} does not load: there is no such file.") from error
     except (OSError, ValueError) as error:

@@ -13,6 +13,7 @@ from haploop.controller.dissipation import Element, load_plugin, registry
 from haploop.launch.scene.events import elements_of, try_out
 from haploop.launch.scene.file import load
 from haploop.launch.spec import RunFailed, RunSpec, discard, keep_plugin, make_output, write_scene
+from haploop.protocol.files import read_text
 from haploop.protocol.plugin_file import bring_file
 from haploop.protocol.scene.scene import Scene
 
@@ -112,7 +113,7 @@ def lay_out(
     try:
         attachments = {"scene.toml": write_scene(scene, directory)}
         kept = [keep_plugin(plugin, directory) for plugin in plugins]
-        attachments |= {f"plugins/{path.name}": path.read_text(encoding="utf-8") for path in kept}
+        attachments |= {f"plugins/{path.name}": read_text(path) for path in kept}
     except BaseException:
         discard(directory, is_new)
         raise

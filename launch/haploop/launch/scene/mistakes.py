@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 COMMAND_LINE = "--set"
 # At most this many mistakes are reported; if there are more, one of them causes the others.
@@ -55,6 +56,10 @@ class SceneError(ValueError):
         told = [str(mistake) for mistake in self.mistakes[:_MOST_TOLD]]
         more = len(self.mistakes) - len(told)
         super().__init__("\n".join([*told, f"... and {counted(more, 'more mistake')}."] if more else told))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Makes it again from its mistakes where it comes to another process."""
+        return SceneError, (self.mistakes,)
 
 
 def _without_twins(mistakes: list[Mistake]) -> list[Mistake]:

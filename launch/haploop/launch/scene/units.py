@@ -40,9 +40,9 @@ def from_text(text: str, target: str) -> Decimal:
 
 _AFTER_SLASH = re.compile(r"(.*?\S)\s+/\s+(\S.*)")
 _IN_BRACKETS = re.compile(r"(.*?)\s*[(\[]([^)\]]*)[)\]]\s*")
-# Units that stand after an underscore, unless another stands before them: in v_m_s the unit is not s.
+# Units that stand after an underscore; in v_mm_s the second one stands for the stroke of mm/s.
 _LENGTH, _TIME = "[cmunµμ]?m", "[munµμ]?s"
-_AFTER_UNDERSCORE = re.compile(rf"(?:.*_)?(?!{_LENGTH}_)[^_]+_({_LENGTH}|{_TIME}|{_LENGTH}/s(?:\^?2)?|m?N)")
+_AFTER_UNDERSCORE = re.compile(rf"(?:.*_)?(?!{_LENGTH}_)[^_]+_({_LENGTH}|{_TIME}|{_LENGTH}[/_]s(?:\^?2)?|m?N)")
 
 
 def name_and_unit(head: str) -> tuple[str, str]:
@@ -51,7 +51,7 @@ def name_and_unit(head: str) -> tuple[str, str]:
     In ``"x_mm"`` the unit is part of the name.
     """
     if part := _AFTER_UNDERSCORE.fullmatch(head.strip()):
-        return head.strip(), part[1]
+        return head.strip(), part[1].replace("_", "/")
     match = _IN_BRACKETS.fullmatch(head)
     if match is None and (after := _AFTER_SLASH.fullmatch(head)) and is_unit(after[2]):
         match = after

@@ -40,11 +40,6 @@ class Friction(NamedTuple):
         breakaway_N = table.kinetic if table.breakaway is None else table.breakaway
         return cls(table.kinetic, breakaway_N, table.stribeck_velocity or 0.0, breakaway_N * (1.0 + _MARGIN))
 
-    @property
-    def is_constant(self) -> bool:
-        """Whether F is the same at every speed."""
-        return not self.stribeck_m_s
-
 
 # The functions below serve one run with plain numbers, many runs at once with arrays and, unchanged, the loops of
 # machine code.

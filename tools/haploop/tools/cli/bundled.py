@@ -71,15 +71,21 @@ def new(
     with plain_errors():
         try:
             text = first_scene(device, hand, wall, file.parent)
-            with file.open("x", encoding="utf-8") as new_file:
-                new_file.write(text)
         except FirstSceneError as error:
             leave(str(error), WRONG_USE)
+        except OSError as error:
+            leave(f"{error.filename} cannot be read: {error.strerror}.", WRONG_USE)
+        is_new = False
+        try:
+            with file.open("x", encoding="utf-8") as new_file:
+                is_new = True
+                new_file.write(text)
         except FileExistsError:
             leave(f"{file} already exists; name a file that does not.", WRONG_USE)
         except OSError as error:
-            with contextlib.suppress(OSError):  # a full disk leaves a broken file, which is removed
-                file.unlink()
+            if is_new:
+                with contextlib.suppress(OSError):  # a full disk leaves a broken file, which is removed
+                    file.unlink()
             leave(f"{file} cannot be written: {error.strerror}.", FAILED)
         try:
             load(file)

@@ -14,6 +14,7 @@ from haploop.controller.dissipation import load_plugin
 from haploop.launch.batch.stacking import is_batchable, structure
 from haploop.launch.runs.in_batch import FEWEST
 from haploop.logger.summary import Summary
+from haploop.protocol.files import read_text
 from haploop.protocol.scene.scene import Scene
 from haploop.tools.executor.executors import make_executor
 from haploop.tools.executor.work import Work
@@ -212,7 +213,7 @@ def read_sources(plugins: Iterable[Path]) -> tuple[tuple[str, str], ...]:
     """Reads plugin files for workers, which have none of their own, as (path, text); PluginError if one is unusable."""
     for path in plugins:
         load_plugin(path)
-    return tuple((str(path), path.read_text(encoding="utf-8")) for path in map(Path, plugins))
+    return tuple((str(path), read_text(path)) for path in map(Path, plugins))
 
 
 def _items(flying: Mapping[Any, Group]) -> int:

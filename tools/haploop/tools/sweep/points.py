@@ -39,8 +39,11 @@ class AxisError(ValueError):
     def __init__(
         self, expected: str, given: str | None = None, nearest: str | None = None, place: str | int = ""
     ) -> None:
-        super().__init__(expected)
+        super().__init__(expected, given, nearest, place)
         self.expected, self.given, self.nearest, self.place = expected, given, nearest, place
+
+    def __str__(self) -> str:
+        return self.expected
 
 
 def number_at(path: Sequence[str], scene: Layers, kinds: Mapping[str, type[Element]]) -> Number | None:

@@ -33,7 +33,7 @@ from haploop.tools.sweep.cell_scene import Refused, Values, resolved
 from haploop.tools.sweep.cells import Axis, Bisect, Sweep
 from haploop.tools.sweep.points import AxisError, Span, listed, make_points, number_at
 from haploop.tools.sweep.record import make_columns, usual
-from haploop.tools.sweep.table import Column
+from haploop.tools.sweep.table import SEED, Column
 
 MOST_AXES = 3
 _SCENE = (
@@ -104,6 +104,8 @@ class _Reader:
         bisect = self._bisect(axes)
         if bisect and base and base.run.verdict == "window":  # whose runs are never called steady
             bisect = replace(bisect, holds=OF_WINDOW.get(bisect.holds, bisect.holds))
+        if table and table.repeat > 1 and any(axis.key == SEED for axis in axes):
+            self._layers.complain(("repeat",), "It draws seeds, and so does the axis seed; leave one of them out.")
         if self._layers.mistakes or table is None or base is None:
             raise SceneError(self._layers.mistakes)
         title = table.title or self._layers.path.stem

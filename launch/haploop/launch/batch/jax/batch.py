@@ -118,7 +118,7 @@ class CompiledBatch(Batch):
             if new.any() and self._keep_from:
                 carry, rings = self._again(call, before, rings)
             if new.any() or done == until:
-                self._take_state(carry, state, first, done)
+                self._take_state(carry, state, done)
                 self._fetch(carry, rings, writable=done == until < self._end)
                 self._report_ends(new, first + np.asarray(carry.ticks))
         self._controller.tick += done - first
@@ -181,7 +181,7 @@ class CompiledBatch(Batch):
 
         return tree_map(of_each, state)
 
-    def _take_state(self, carry: Carry, template: BatchState, first: int, end: int) -> None:
+    def _take_state(self, carry: Carry, template: BatchState, end: int) -> None:
         """Puts the objects of the batch into the state that the program has reached at tick ``end``."""
         motion, acting, saturated, noise, controller = tree_unflatten(template, map(np.array, carry.state))
         newest = end - 1 - self._time.delay_steps // self._time.steps_per_tick

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from haploop.protocol.scene.hand_force import Sine, Trace
+from haploop.protocol.scene.hand_force import Constant, Ramp, Sine, Step, Trace
 from haploop.protocol.scene.scene import Scene, Wall
 
 _SAMPLES = 10_001
 
 
 def _extremes_N(scene: Scene) -> tuple[float, float]:
-    """Returns the least and the largest force of the hand; for a kind that is not haploop's own, among its samples."""
+    """Returns the least and the largest lasting force of the hand; of a kind that is not haploop's own, of samples."""
     force = scene.hand.force if scene.hand else None
     if force is None:
         return 0.0, 0.0
@@ -19,8 +19,8 @@ def _extremes_N(scene: Scene) -> tuple[float, float]:
         return min(force.force), max(force.force)
     if isinstance(force, Sine):
         return force.offset - abs(force.amplitude), force.offset + abs(force.amplitude)
-    if math.isfinite(force.constant_from_s()):
-        return force.value, force.value  # pyright: ignore[reportAttributeAccessIssue]
+    if isinstance(force, Constant | Ramp | Step):
+        return force.value, force.value
     import numpy as np
 
     samples = force.force_at(np.linspace(0.0, scene.duration, _SAMPLES))

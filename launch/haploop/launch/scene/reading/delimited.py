@@ -23,6 +23,8 @@ from haploop.protocol.names import nearest
 
 Floats = NDArray[np.float64]
 
+# The table begins within so many rows.
+_MOST_ABOVE = 50
 _BLOCK_ROWS = 16_384
 # Names by which columns of times and forces are known; without a unit, times are seconds under the last.
 SECONDS = "seconds"
@@ -64,8 +66,14 @@ class DelimitedFile:
         """Finds delimiter and columns from the beginning of the file; raises RecordingError without a file or a row."""
         self.path = path
         with _open_lines(self.path) as lines:
-            first = list(itertools.islice((line for line in lines if line.strip()), 50))
-        rows = [line for line in first if not line.startswith("#")]
+            rows, comment = list[str](), ""
+            for line in filter(str.strip, lines):
+                if not line.startswith("#"):
+                    rows.append(line)
+                elif not rows:
+                    comment = line
+                if len(rows) == _MOST_ABOVE:
+                    break
         if not rows:
             raise RecordingError(f"{path} is empty: a line for every sample was expected.")
         self._above, self._delimiter = next(
@@ -83,7 +91,7 @@ class DelimitedFile:
         self.title = len(titles)
         if not self._above:
             cells = self._cells(rows[:1])[0]
-            named = self._cells([first[0].lstrip("# ")])[0] if first[0].startswith("#") else []
+            named = self._cells([comment.lstrip("# ")])[0] if comment else []
             header = named if len(named) == len(cells) else [str(i + 1) for i in range(len(cells))]
         named_units = [name_and_unit(cell) for cell in header]
         self.columns = [

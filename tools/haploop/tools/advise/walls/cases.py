@@ -6,6 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from haploop.launch.plan.meant.hand_and_wall import inward
 from haploop.plant.chain.chain import Chain
 from haploop.protocol.amounts import amount
 from haploop.protocol.scene.hand_force import Constant, Sine, constant_from_s
@@ -87,9 +90,9 @@ def make_loop(scene: Scene, has_task: bool, share: float = OF_THE_ACTUATOR) -> S
     most_N = value_at(scene, "actuator.saturation")
     force_N = min(PRESS_N, share * (math.inf if most_N is None else most_N))
     hand = scene.hand or Hand()
-    if has_task and scene.wall and hand.force and math.isfinite(constant_from_s(hand.force)):
-        inward = -1.0 if scene.wall.occupies == "below" else 1.0
-        net_N = inward * (value_at(scene, "hand.force.value") + hand.stiffness * (hand.rest - scene.wall.position))
+    if has_task and scene.wall and hand.force and math.isfinite(lasts_from_s := constant_from_s(hand.force)):
+        [lasting_N] = hand.force.force_at(np.array([lasts_from_s])).tolist()
+        net_N = inward(scene.wall) * (lasting_N + hand.stiffness * (hand.rest - scene.wall.position))
         force_N = net_N if net_N > 0.0 else force_N
     held = replace(hand, force=Constant(value=force_N))
     return replace(with_value(scene, "run.log", "none"), title="", event=(), hand=held)
