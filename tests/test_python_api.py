@@ -215,6 +215,7 @@ def test_numbers_of_the_summary_come_with_their_units(scene: Scene) -> None:
         "final.v_m_s": "m/s",
         "extremes.force_max_N": "N",
         "energy.elements.0.true_J": "J",
+        "energy.elements.0.parameters.mass": "kg",
         "duration_s": "s",
         "real_time_factor": "",
     }

@@ -68,7 +68,7 @@ class BatchLogger:
     def __init__(self, scene: Scene, time: Timebase, members: int, *, energy: bool, trajectories: bool) -> None:
         self._time = time
         self.books = Books(scene, time, members) if energy else None
-        self.window = Window(time, scene.encoder.resolution if scene.encoder else 0.0, members)
+        self.window = Window(time, scene.count_m, members)
         self.rows: list[Row] = []
         self.changes = ChangesMade()
         self._accounts: dict[int, Account] = {}

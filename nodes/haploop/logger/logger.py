@@ -44,7 +44,7 @@ class Logger:
     def __init__(self, scene: Scene, time: Timebase, channels: Channels | None) -> None:
         self._scene, self.time, self._channels = scene, time, channels
         self.books = Books(scene, time)
-        self.window = Window(time, scene.encoder.resolution if scene.encoder else 0.0)
+        self.window = Window(time, scene.count_m)
         self._measures: RunMeasures | None = None
         self._accounts: dict[int, Account] = {}
         self._events: list[tuple[int, Event]] = []

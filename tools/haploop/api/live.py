@@ -22,13 +22,12 @@ from haploop.launch.processes import run_directory
 from haploop.launch.processes.run_directory import CommandRefused, Elsewhere, LiveRun, RunNotFound, ask
 from haploop.launch.runs.loaded_scene import SET_SO, LoadedScene, load, plain
 from haploop.launch.runs.result import Result
-from haploop.launch.scene.number import Number
+from haploop.launch.scene.number import TIME
 from haploop.launch.spec import PLUGINS, SCENE, RunFailed
 from haploop.logger.log.recording import Recording
 from haploop.logger.session import LOG
 from haploop.logger.summary import SUMMARY
 from haploop.logger.summary import read as read_summary
-from haploop.protocol.quantity import Quantity
 
 _LOOK_S, _ENDS_WITHIN_S, _TOLD = 0.01, 20.0, "told.txt"
 # Pace, in simulated seconds per second, of a run that is to stand still at its start: no tick after the first is due.
@@ -42,12 +41,10 @@ _PAUSED = (
     "and waits for its end."
 )
 
-_TIME = Number(Quantity("s", at_least=0, about="time"))
-
 
 def _seconds(at: Any) -> float | None:
     """Returns a time in s, given in s, as text with its unit or as a pint quantity; None if there is none."""
-    return None if at is None else _TIME.read(plain(at))
+    return None if at is None else TIME.read(plain(at))
 
 
 class _Started(NamedTuple):

@@ -21,6 +21,7 @@ from haploop.logger.summary import Summary
 from haploop.plant.motion.one_mass import OneMassMotion
 from haploop.plant.plant import beyond
 from haploop.plant.where_it_pays import WhereItPays
+from haploop.protocol.changes import is_change
 from haploop.protocol.scene.scene import Scene
 from haploop.protocol.ticks import Timebase
 from haploop.protocol.trees import tree_select, tree_take
@@ -115,7 +116,7 @@ class Batch(BatchLoop):
     def _schedule(self, scene: Scene) -> None:
         self._end, self._changes = self._time.ticks, set[int]()
         for tick, event in scene_events(scene, self._time):
-            if "swap" in event or "set" in event:
+            if is_change(event):
                 self._controller.schedule(tick, event)
                 self._logger.changes.note(tick, event)
                 self._changes.add(tick)

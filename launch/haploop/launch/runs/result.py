@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import nullcontext
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
 
 # The unit that the end of a summary's key stands for; the first end that fits counts.
 _UNITS = {"_Hz": "Hz", "_N_m": "N/m", "_m_s": "m/s", "_1_s": "1/s", "_m": "m", "_s": "s", "_N": "N", "_J": "J"}
+
+
+_PARAMETER = re.compile(r"energy\.elements\.(\d+)\.parameters\.(\w+)")
 
 
 def unit_of(key: str) -> str:
@@ -100,7 +104,14 @@ class Result:
             near = meant(key, known)
             raise KeyError(f"There is no number {key} in the summary{near or '; it has ' + ', '.join(known)}.")
         value = known[key]
-        return pint.get_application_registry().Quantity(math.nan if value is None else value, unit_of(key))
+        return pint.get_application_registry().Quantity(math.nan if value is None else value, self._unit_of(key))
+
+    def _unit_of(self, key: str) -> str:
+        """Returns the unit of a number of the summary; that of an element's parameter is its kind's."""
+        if parameter := _PARAMETER.fullmatch(key):
+            kind = self.scene.kinds[self.summary["energy"]["elements"][int(parameter[1])]["kind"]]
+            return kind.parameters()[parameter[2]][0].unit
+        return unit_of(key)
 
     def __repr__(self) -> str:
         swing_mm = 1e3 * (self.summary["window"]["oscillation_m"] or 0.0)

@@ -75,6 +75,9 @@ class Number:
         }
 
 
+TIME = Number(Quantity("s", at_least=0, about="time"))
+
+
 def si(unit: str, about: str = "", *, whole: bool = False, **bounds: float) -> Number:
     """Makes a ``Number`` in one line: ``mass: Annotated[float, si("kg", "mass of the device", above=0)]``."""
     return Number(quantity(unit, about, whole=whole, **bounds))

@@ -99,7 +99,7 @@ def findings(
     half = large.shape[1] // 2
     inside = _is_inside(wall, small[:, -quarter:]) & _is_inside(wall, large[:, -quarter:])
     stays = _is_inside(wall, small[:, half:], np.all) & _is_inside(wall, large[:, half:], np.all)
-    count_m = np.array([scene.encoder.resolution if scene.encoder else 0.0 for scene in scenes])
+    count_m = np.array([scene.count_m for scene in scenes])
     smooth = np.array([is_smooth(scene) for scene in scenes])
     pushed = Pushed(small, large, command, np.abs(push_N), count_m, inside, stays, smooth)
     swings = measure(pushed, time.control_rate)

@@ -165,7 +165,7 @@ def position_noise_m(scene: Scene) -> float:
     """Returns sigma: the one that ``[velocity]`` gives, or that of rounding (q / sqrt(12)) and noise together."""
     if scene.velocity and scene.velocity.measurement_noise is not None:
         return scene.velocity.measurement_noise
-    rounding = (scene.encoder.resolution if scene.encoder else 0.0) / math.sqrt(12.0)
+    rounding = scene.count_m / math.sqrt(12.0)
     return each(math.hypot, rounding, scene.noise.deviation if scene.noise else 0.0)
 
 

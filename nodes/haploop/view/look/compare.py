@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from haploop.protocol.changes import Event
+from haploop.protocol.changes import Event, is_change
 from haploop.view.look.budget import budget
 from haploop.view.look.sight import Sight, see, window_ticks
 from haploop.view.store.history import History
@@ -41,7 +41,7 @@ class Changes:
 
     def note(self, history: History, events: Iterable[tuple[int, Event]]) -> None:
         """Records the changes among these events, and keeps what was before those that the history has reached."""
-        self._ticks = sorted({tick for tick, event in events if "swap" in event or "set" in event})
+        self._ticks = sorted({tick for tick, event in events if is_change(event)})
         for tick in self._ticks[-_MOST:]:
             if tick and tick not in self._before and history.end_tick >= tick:
                 self._before[tick] = self._half(history, self.since(tick), tick)

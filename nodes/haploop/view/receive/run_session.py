@@ -64,9 +64,7 @@ class RunSession:
         self.status: Message = {}
         self.events: list[tuple[int, Event]] = []
         most_N = scene.actuator.saturation if scene.actuator else None
-        self.changes = Changes(
-            scene.encoder.resolution if scene.encoder else 0.0, math.inf if most_N is None else most_N
-        )
+        self.changes = Changes(scene.count_m, math.inf if most_N is None else most_N)
         self.delay_s = scene.clock.round_trip_delay
         self.outcome = self.why = ""
         self.given_up = False

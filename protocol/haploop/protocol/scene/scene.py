@@ -156,6 +156,11 @@ class Scene(OpenTable):
     event: tuple[EventTable, ...] = ()
     run: Run = Run()
 
+    @property
+    def count_m(self) -> float:
+        """Returns the step of the encoder, m; 0 without one."""
+        return self.encoder.resolution if self.encoder else 0.0
+
     def estimate(self, of: str) -> Velocity | Acceleration:
         """Returns the table of an estimate, "velocity" or "acceleration": its defaults where the scene has none."""
         return (self.velocity or Velocity()) if of == "velocity" else (self.acceleration or Acceleration())

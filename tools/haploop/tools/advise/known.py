@@ -38,7 +38,7 @@ def formulas(loop: Scene) -> list[Formula]:
     no place to rest; viscous damping has to absorb the energy that sampling generates, or friction or the hand must.
     Then the exact map of one tick of the same loop without encoder and friction, if that loop is linear.
     """
-    q = loop.encoder.resolution if loop.encoder else 0.0
+    q = loop.count_m
     friction = loop.friction.kinetic if loop.friction else 0.0
     chain, period_s = Chain.from_scene(loop), 1.0 / loop.clock.control_rate
     b = next(b for name, (body, b) in chain.grounded.items() if body == 0 and name != "hand")

@@ -122,11 +122,10 @@ def parse_seconds(text: str | None, option: str = "--at") -> float | None:
         return None
     with suppress(ValueError):
         return float(text)
-    from haploop.launch.scene.number import Number
-    from haploop.protocol.quantity import Quantity
+    from haploop.launch.scene.number import TIME
 
     try:
-        return float(Number(Quantity("s", at_least=0, about="time")).read(text))
+        return float(TIME.read(text))
     except ValueError as error:
         leave(f"{option} must be a time such as 1.5 or '1500 ms', but {text!r} was given: {error}", WRONG_USE)
 

@@ -141,7 +141,7 @@ def statistics(scene: Scene, x_m: np.ndarray, v_m_s: np.ndarray) -> dict[str, fl
     figures: dict[str, float | None] = {"amplitude_m": float(np.ptp(x)) / 2.0}
     offset = x - x.mean()
     below = np.flatnonzero((offset[:-1] < 0.0) & (offset[1:] >= 0.0))
-    smallest = max(scene.encoder.resolution if scene.encoder else 0.0, SMALLEST_SWING_M)
+    smallest = max(scene.count_m, SMALLEST_SWING_M)
     if len(below) < 2 or not np.ptp(x) > 2.0 * smallest:
         return figures | {"frequency_Hz": None, "energy_per_cycle_J": None}
     crossings = below + offset[below] / (offset[below] - offset[below + 1])

@@ -51,9 +51,5 @@ def start_depth_m(scene: Scene) -> float:
     return (scene.device.position - wall.position) * inward(wall)
 
 
-def count_m(scene: Scene) -> float:
-    return scene.encoder.resolution if scene.encoder else 0.0
-
-
 def wall_moves(scene: Scene) -> bool:
     return any("wall.position" in (event.set or {}) for event in scene.event)

@@ -8,6 +8,7 @@ from haploop.launch.plan.meant.hand_and_wall import inward, inward_force_N, star
 from haploop.launch.plan.meant.rule import Found, Rule
 from haploop.protocol.scene.hand_force import Trace
 from haploop.protocol.scene.scene import NO_ELEMENT, Scene, accelerometer_is_used, hand_is_unmodelled
+from haploop.protocol.ticks import Timebase
 from haploop.protocol.walls.registry import make_wall
 
 # The stiffness of a softer wall was mostly meant in N/mm.
@@ -96,15 +97,15 @@ def _pressed_deep(scene: Scene) -> Found | None:
 
 def _overwritten(scene: Scene) -> Found | None:
     """Finds the first two events of one tick of which the later overwrites what the earlier did."""
-    rate = scene.clock.control_rate
+    time = Timebase.from_scene(scene)
     did: dict[tuple[int, str], int] = {}
     for index, event in enumerate(scene.event):
-        tick = math.ceil(event.at * rate - 1e-6)
+        tick = time.first_tick_at(event.at)
         keys = [f"dissipation.{event.element or 0}"] if event.swap else [*(event.set or {})]
         for key in keys:
             over = [what for at, what in did if at == tick and (what == key or what.startswith(f"{key}."))]
             if over:
-                return {"what": over[0], "at_s": tick / rate, "tick": tick, "first": did[tick, over[0]]}
+                return {"what": over[0], "at_s": tick / time.control_rate, "tick": tick, "first": did[tick, over[0]]}
         if event.swap and event.swap.name == NO_ELEMENT:  # those after it move up
             did = {(at, what): by for (at, what), by in did.items() if not what.startswith("dissipation.")}
         else:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from haploop.launch.plan.meant.hand_and_wall import (
-    count_m,
     inward,
     inward_force_N,
     most_force_N,
@@ -27,7 +26,7 @@ def _pushed_by_nothing(scene: Scene) -> Found | None:
     if hand_is_unmodelled(scene) or scene.others or scene.noise or wall_moves(scene):
         return None
     spring = bool(hand and hand.stiffness and hand.rest != device.position)
-    pushed = device.velocity or most_force_N(scene) or spring or start_depth_m(scene) > -count_m(scene)
+    pushed = device.velocity or most_force_N(scene) or spring or start_depth_m(scene) > -scene.count_m
     return None if pushed else {}
 
 
@@ -76,7 +75,7 @@ def _out_of_reach(scene: Scene) -> Found | None:
         return None
     if scene.transmission or (hand and hand.grip):
         reach_m = _reach_of_chain_m(scene)
-        way_m = abs(wall.position - device.position) - count_m(scene)
+        way_m = abs(wall.position - device.position) - scene.count_m
         return {"way_mm": way_m * 1e3, "reach_mm": reach_m * 1e3} if way_m > reach_m else None
     mass, damping = device.mass + (hand.mass if hand else 0.0), device.damping + (hand.damping if hand else 0.0)
     force_N, spring = most_force_N(scene) + _friction_N(scene), hand.stiffness if hand else 0.0
@@ -88,7 +87,7 @@ def _out_of_reach(scene: Scene) -> Found | None:
         swing = math.hypot(begin - hand.rest, speed * math.sqrt(mass / spring)) + force_N * held / spring
         if ratio and abs(begin - hand.rest) + swing < reach_m:
             begin, reach_m = hand.rest, swing
-    way_m = abs(wall.position - begin) - count_m(scene)
+    way_m = abs(wall.position - begin) - scene.count_m
     is_told = _beyond_the_end(scene) is not None
     return {"way_mm": way_m * 1e3, "reach_mm": reach_m * 1e3} if way_m > reach_m and not is_told else None
 
@@ -132,9 +131,9 @@ def _not_held_there(scene: Scene) -> Found | None:
         return None
     changes = math.isinf(hand.force.constant_from_s()) and not isinstance(hand.force, Trace)
     moves = changes or scene.others or scene.noise or wall_moves(scene)
-    if moves or start_depth_m(scene) >= -count_m(scene) or any(of(scene) is not None for of in _KEPT_OFF):
+    if moves or start_depth_m(scene) >= -scene.count_m or any(of(scene) is not None for of in _KEPT_OFF):
         return None
-    way_m = (wall.position - hand.rest) * inward(wall) - count_m(scene)
+    way_m = (wall.position - hand.rest) * inward(wall) - scene.count_m
     reach_m = inward_force_N(scene) / hand.stiffness
     if device.velocity and not 0.0 < reach_m <= _FEEBLE * way_m:
         return None
