@@ -124,7 +124,7 @@ def test_a_live_loop_is_steered_to_the_bits_of_the_same_change_written_in_the_sc
         tick = loop.swap("unidirectional-inertia", mass="10 g")
         changed = loop.set({"wall.stiffness": 500})
         assert loop.undo() == changed
-        loop.set({"wall.stiffness": 500}, at="300 ms")
+        loop.set({"wall.stiffness": 500}, at="250 ms")
         assert loop.undo() is None
         loop.set({"wall.stiffness": "0.2 N/mm"}, at="200 ms")
         live = loop.finish()
