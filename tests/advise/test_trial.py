@@ -1,6 +1,7 @@
 """Many loops side by side do what one run does, and a wall is tried in all its cases."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from haploop.protocol.scene.scene import ElementTable, Scene
 from haploop.tools.advise.report import describe
 from haploop.tools.advise.walls.cases import HOLDS, Case, make_loop
 from haploop.tools.advise.walls.corners import corner, ranges
+from haploop.tools.advise.walls.felt import slow_swing_m
 from haploop.tools.advise.walls.loops import LoneLoop, Loops, make_loops
 from haploop.tools.advise.walls.store import Job, Store, Tried
 from haploop.tools.advise.walls.trial import Trial
@@ -41,6 +43,37 @@ def test_without_friction_loops_side_by_side_whatever_simple_elements_they_have_
         alone = LoneLoop(one, KINDS).go_on(400)
         assert np.array_equal(together.x[:, place], alone.x[:, 0])
         assert np.array_equal(together.command[:, place], alone.command[:, 0])
+
+
+@pytest.mark.parametrize(
+    ("damping", "stiffness", "is_borne"), [(0.16, 120.0, False), (0.16, 60.0, True), (6.0, 120.0, True)]
+)
+def test_a_wall_off_which_a_device_bounces_for_good_is_not_borne_however_slowly(damping, stiffness, is_borne):
+    """0.3 kg behind 1.4 ms beyond its limit of 90 N/m: 62 mm at 3 Hz, of two turns a quarter second.
+
+    A wall of 120 N/m was called safe; with more damping it is.
+    """
+    of = scene(
+        device={"mass": 0.3, "damping": damping}, friction={"kinetic": 0.024}, encoder={"resolution": 5e-6},
+        clock={"round_trip_delay": 0.0014}, hand=None,
+    )  # fmt: skip
+    with Trial(Store(None)) as trial:
+        [failure] = trial.failures(make_loop(of, has_task=False), [Tried(stiffness)], [Case(hold) for hold in HOLDS])
+    assert (failure is None) == is_borne
+    if failure:
+        assert re.match(
+            r"after 11 s it still swings slowly, or is off the wall, 6\d mm peak to peak; hold", describe(failure)
+        )
+
+
+def test_a_hand_that_sways_over_a_second_does_not_swing_slowly_and_a_line_of_three_hertz_does():
+    t = np.linspace(0.0, 1.0, 400)
+    sway, swing = -0.02 + 6e-3 * np.sin(np.pi * t + 0.3), 1e-3 * np.sin(2.0 * np.pi * 3.0 * t)
+    bounce = np.maximum(-0.01, 0.03 * np.sin(2.0 * np.pi * 1.0 * t))
+    still, swings, bounces, gone = slow_swing_m(np.stack([sway, sway + swing, bounce, np.full(400, np.nan)], axis=1))
+    assert (still, gone) == (0.0, 0.0)
+    assert swings == pytest.approx(2e-3, rel=0.2)
+    assert bounces == pytest.approx(0.04, rel=0.01)
 
 
 @pytest.mark.slow
@@ -125,12 +158,20 @@ def test_a_hold_of_the_task_alone_does_not_tell_a_wall_that_buzzes_at_another():
     assert at_three_times
 
 
-def test_a_wall_that_throws_the_device_off_for_good_cannot_be_told_and_is_not_borne():
-    thrown = make_loop(scene(device={"mass": 100.0, "damping": 0.0}), has_task=False)
+@pytest.mark.parametrize(
+    ("friction_N", "mass", "limit_m", "told"),
+    [
+        (0.5, 1.0, 1.0, "cannot be judged: in no case is the device still at the wall after 0.75 s"),
+        (0.0, 100.0, 1.0, "the device leaves its limits; hold x 0.3"),
+        (0.0, 100.0, 9.0, "after 11 s it still swings slowly, or is off the wall, 173 mm peak to peak; hold x 0.3"),
+    ],
+)
+def test_a_wall_that_throws_the_device_off_for_good_is_not_borne(friction_N, mass, limit_m, told):
+    thrown = scene(device={"mass": mass, "damping": 0.0}, friction={"kinetic": friction_N}, diverged_beyond=limit_m)
     with Trial(Store()) as trial:
-        [failure] = trial.failures(thrown, [Tried(1e5)], [Case(0.3)])
+        [failure] = trial.failures(make_loop(thrown, has_task=False), [Tried(1e5)], [Case(0.3)])
     assert failure
-    assert describe(failure) == "cannot be judged: in no case is the device still at the wall after 0.75 s"
+    assert describe(failure) == told
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.15])

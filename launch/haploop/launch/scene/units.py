@@ -41,8 +41,8 @@ def from_text(text: str, target: str) -> Decimal:
 _AFTER_SLASH = re.compile(r"(.*?\S)\s+/\s+(\S.*)")
 _IN_BRACKETS = re.compile(r"(.*?)\s*[(\[]([^)\]]*)[)\]]\s*")
 # Units that stand after an underscore; in v_mm_s the second one stands for the stroke of mm/s.
-_LENGTH, _TIME = "[cmunµμ]?m", "[munµμ]?s"
-_AFTER_UNDERSCORE = re.compile(rf"(?:.*_)?(?!{_LENGTH}_)[^_]+_({_LENGTH}|{_TIME}|{_LENGTH}[/_]s(?:\^?2)?|m?N)")
+_LENGTH, _TIME, _FORCE = "[cmunµμ]?m", "[munµμ]?s", "[cmk]?N|k?gf|lbf|ozf"
+_AFTER_UNDERSCORE = re.compile(rf"(?:.*_)?(?!{_LENGTH}_)[^_]+_({_LENGTH}|{_TIME}|{_LENGTH}[/_]s(?:\^?2)?|{_FORCE})")
 
 
 def name_and_unit(head: str) -> tuple[str, str]:

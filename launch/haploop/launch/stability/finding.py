@@ -40,7 +40,7 @@ _FINE_UM, STILL_1_S = 10.0, 0.05
 # What ``Finding.entries`` reports about the run beside the finding.
 BESIDE = {
     "own_share": "share of the oscillation in the run's last window that the loop sustains alone; the rest is the "
-    "hand's own motion or noise, or dies away; null where that is unknown",
+    "hand's own motion or noise, dies away, or is wider than what the push leaves; null where that is unknown",
     "moved_beside": "what else moved the run at its end: the hand's motion, noise",
     "provisos": "conditions that the verdict rests on, to be stated together with it",
 }

@@ -39,6 +39,7 @@ _HAND = "of {0} kg, {1} N s/m and {2} N/m{3}, each 20 % more or less; another ha
 _GRIP = ", holding through a grip of {0} N s/m and {1} N/m"
 _NO_HAND = "none, only its force: a hand may make this wall buzz (--hand)"
 _SAFE = "{0} with {1}: at rest, or swinging by less than a hand feels"
+_SLOWLY = "after {at_s:.3g} s it still swings slowly, or is off the wall, {width} peak to peak; {case}"
 _GRITTY = "; counts may be felt as grit"
 # What the run of the advised scene adds to "steady"; the search has tried the wall at every hold.
 _SOME_HOLDS = "tried at only some holds of its hand"
@@ -198,6 +199,8 @@ def describe(failure: Failure) -> str:
     """Describes what a wall does in the case that it does not bear."""
     if failure.gone:
         return f"the device leaves its limits; {failure.case}"
+    if failure.motion_m and not failure.frequency_Hz:
+        return _SLOWLY.format(width=amount(failure.motion_m, "m", 2), at_s=failure.at_s, case=failure.case)
     if not failure.frequency_Hz:
         return failure.case
     felt = _FELT[failure.by_force] if failure.other_felt < 1.0 else _FELT_BOTH

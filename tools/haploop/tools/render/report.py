@@ -28,6 +28,7 @@ _LIMITED = "; of the command: the actuator gave less at times"
 # Frequencies that differ by no more than this share are told once, as that of the pushed loop, which is more exact.
 _ALIKE = 0.15
 _AT = ", at about {0} Hz"
+_REST = "dying away, or a wider swing than the push leaves"
 _NOTE = "A note on its scene: {first}"
 _NOTES = "{count} notes on its scene; the first: {first}"
 # Entries of the summary's window, their words, and what stands after the number. Peaks of two swings do not add.
@@ -256,7 +257,7 @@ def _stability(found: Summary) -> list[tuple[str, str]]:
     if (share := found.get("own_share")) is not None:
         beside = found.get("moved_beside", ("the hand's motion", "noise"))
         own = f"{100 * share:.0f} %" if share >= 0.01 else "less than 1 %"
-        rest = f"; the rest is {' or '.join([*beside, 'dying away'])}" if share < 0.995 else ""
+        rest = f"; the rest is {', '.join([*beside, _REST])}" if share < 0.995 else ""
         rows.append(("of the oscillation", f"{own} is the loop's own{rest}"))
     if (settles_s := found.get("settles_s")) is not None:
         rows.append(("settles within", f"{amount(settles_s, 's')}, to 5 %"))

@@ -19,6 +19,9 @@ _LINE = 0.5
 # Turns of less than this are rounding: an atom is as wide.
 _LEAST_M = 1e-10
 
+# Powers of time that a hand's sway of half a period a stretch has; a device off its wall by more than this, m, bounces.
+_SWAY_POWERS, _OFF_M = 6, 5e-4
+
 # From frequencies in Hz to what a hand feels at them.
 Threshold = Callable[[np.ndarray], np.ndarray]
 
@@ -97,6 +100,18 @@ def _turns(u: np.ndarray) -> np.ndarray:
     last = np.maximum.accumulate(np.where(direction != 0.0, rows, -1), axis=0)
     held = np.where(last >= 0, np.take_along_axis(direction, np.maximum(last, 0), axis=0), 0.0)
     return (held[1:] * held[:-1] < 0.0).sum(axis=0)
+
+
+def slow_swing_m(x: np.ndarray) -> np.ndarray:
+    """Returns how wide each column still swings, or bounces off its wall at 0, peak to peak, m; 0 where it does not.
+
+    It swings where it turns ``TURNS`` times, about the polynomial that a swaying hand follows, and bounces where it is
+    off the wall by half a millimetre at times.
+    """
+    x = np.where(np.isfinite(x).all(axis=0), x, 0.0)
+    powers = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, len(x)), _SWAY_POWERS))[0]
+    swings = np.where(_turns(x) >= TURNS, np.ptp(x - powers @ (powers.T @ x), axis=0), 0.0)
+    return np.where(x.max(axis=0) > _OFF_M, np.ptp(x, axis=0), swings)
 
 
 def ripple(u: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ import numpy as np
 from haploop.controller.dissipation import ElementError
 from haploop.protocol.scene.scene import Scene, Wall
 from haploop.tools.advise.walls.cases import LASTS_S, Case, slowness
-from haploop.tools.advise.walls.felt import Buzz, Threshold, buzz, felt_force_N
+from haploop.tools.advise.walls.felt import Buzz, Threshold, buzz, felt_force_N, slow_swing_m
 from haploop.tools.advise.walls.loops import LoneLoop, Loops, is_plain, make_loops
 from haploop.tools.advise.walls.store import Failure, Job, Store, Tried
 from haploop.tools.executor.executors import Executor, InlineExecutor, make_executor, map_parallel
@@ -24,6 +24,9 @@ STRETCH_S, FROM_S = 0.25, 0.75
 # A swing dies away if each stretch is at most this share of the one before; what then is still dying is watched this
 # many times as long.
 _DYING, _LONGER = 0.8, 4
+# Slower swings, and bounces, appear only in several stretches together, of which so many samples each are kept; one
+# wider than this, m, at the end of that longer time is not borne. It is felt from 2 Hz on.
+_TOGETHER, _KEPT, _SLOW_M = 4, 100, 1e-3
 # The failure of a wall about which no case tells anything.
 _NO_CONTACT = "cannot be judged: in no case is the device still at the wall after {0:g} s"
 # Members that are worth a worker of their own.
@@ -136,32 +139,41 @@ def _watch(
 
     usual, first = round(LASTS_S / STRETCH_S), round(FROM_S / STRETCH_S)
     before = np.full(len(members), math.inf)
+    past, width_m = np.zeros((_TOGETHER, _KEPT, len(members))), np.zeros(len(members))
     for stretch in range(_LONGER * usual):
         kept = np.array([wall not in failed for wall, _ in members])
-        kept &= (before > 0.0) | (stretch < usual)
+        kept &= (before > 0.0) | (stretch < usual) | (width_m > _SLOW_M)
         if not kept.any():
             return
         if not kept.all():
             loops.select(kept)
             members = [member for member, stays in zip(members, kept, strict=True) if stays]
-            before = before[kept]
+            before, past, width_m = before[kept], past[..., kept], width_m[kept]
         try:
             seen = loops.go_on(round(STRETCH_S * late * rate))
         except (ArithmeticError, ElementError):
             failed.update((wall, _failure(jobs[wall].cases[case], 0.0, True, None, 0)) for wall, case in members)
             return
-        bad, found = seen.gone, None
+        bad, found, is_last = seen.gone, None, stretch == _LONGER * usual - 1
+        past = np.roll(past, -1, axis=0)
+        past[-1] = seen.x[np.linspace(0, len(seen.x) - 1, _KEPT).astype(int)]
+        if stretch >= usual - 1:
+            width_m = slow_swing_m(past.reshape(-1, len(members)))
         if stretch >= first:
             touched.update(members[place][0] for place in np.flatnonzero((seen.command != 0.0).any(axis=0)))
         if stretch >= first and not bad.all():
             found = buzz(seen.x, seen.measured, seen.command, rate, felt_N)
-            felt, is_last = found.times_felt >= 1.0, stretch == _LONGER * usual - 1
+            felt = found.times_felt >= 1.0
             bad = bad | (felt & ((found.times_felt > _DYING * before) | is_last))
             before = np.where(felt, found.times_felt, 0.0)
-        for place in np.flatnonzero(bad).tolist():
+        swings = ~bad & is_last & (width_m > _SLOW_M)
+        for place in np.flatnonzero(bad | swings).tolist():
             wall, case = members[place]
             failure = _failure(jobs[wall].cases[case], (stretch + 1) * STRETCH_S * late, seen.gone[place], found, place)
             failure = replace(failure, within_s=STRETCH_S * late)
+            if swings[place]:
+                wide_m = float(width_m[place])
+                failure = replace(failure, motion_m=wide_m, frequency_Hz=0.0, times_felt=wide_m / _SLOW_M)
             worst = failed.setdefault(wall, failure)
             if worst.at_s == failure.at_s and worst.times_felt < failure.times_felt:
                 failed[wall] = failure
