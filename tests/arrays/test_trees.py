@@ -21,6 +21,8 @@ def test_dicts_are_paired_by_their_keys() -> None:
     assert tree_map(lambda a, b: a + b, {"a": 1, "b": 2}, {"b": 20, "a": 10}) == {"a": 11, "b": 22}
     with pytest.raises(ValueError, match="differ in structure"):
         tree_map(lambda a, b: a + b, {"a": 1, "b": 2}, {"b": 20, "c": 10})
+    with pytest.raises(ValueError, match="differ in structure"):
+        tree_map(lambda a, b: a + b, {}, {"b": 20})
 
 
 class Pair(NamedTuple):

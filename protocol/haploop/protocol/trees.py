@@ -35,10 +35,12 @@ def tree_map(function: Callable[..., Any], tree: T, *rest: Any) -> T:
 
 
 def _in_order(tree: Any, other: Any) -> Any:
-    """Returns another dict in the order of the keys of a dict; as it is where their keys differ, None for no node."""
-    if isinstance(tree, dict) and isinstance(other, dict):
-        return [other[key] for key in tree] if other.keys() == tree.keys() else []
-    return other
+    """Returns the children of another dict in the order of the keys of this one; anything but two dicts unchanged."""
+    if not (isinstance(tree, dict) and isinstance(other, dict)):
+        return other
+    if other.keys() != tree.keys():
+        raise ValueError("The trees differ in structure at a node of type dict.")
+    return [other[key] for key in tree]
 
 
 def tree_leaves(tree: Any) -> list[Any]:
