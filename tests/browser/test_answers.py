@@ -46,6 +46,9 @@ def test_a_run_that_is_over_offers_nothing_live_and_says_whether_the_next_one_co
     expect(page.locator("#notice")).to_have_text("The run has ended. A run that is started now will appear here.")
     stand_in.tell(RUNS | {"stays": True})
     expect(page.locator("#notice")).to_have_text("The run has ended.")
+    stand_in.tell(RUNS | {"missed": "Run ab ended before its first tick."})
+    told = "The run has ended. A run that is started now will appear here. Run ab ended before its first tick."
+    expect(page.locator("#notice")).to_have_text(told)
 
 
 @pytest.mark.slow

@@ -121,6 +121,12 @@ class Vanishing(LiveRuns):
         self.other = []
         raise Aborted
 
+    def has_launcher(self, run):
+        return run.id != "other" and super().has_launcher(run)
+
+    def record_of(self, run):
+        return None
+
     def live(self):
         return [*super().live(), *self.other]
 

@@ -13,6 +13,7 @@ from haploop.launch import load, run
 from haploop.launch.runs.run_files import recorded_scene
 from haploop.logger.cause import likely_cause
 from haploop.protocol.scene.scene import ElementTable, Wall
+from haploop.protocol.transport.clock_client import Aborted
 from haploop.tools.cli.live_runs import LiveRuns
 from haploop.view.draw.messages import event_lines, state
 from haploop.view.draw.snapshot import Viewport, snapshot
@@ -216,6 +217,56 @@ def test_of_a_run_that_ended_before_its_first_tick_the_page_says_so():
         assert viewer.why == 'Run later, "run later", ended before its first tick; its terminal says why.'
 
     to_its_end(play())
+
+
+def test_a_run_that_was_over_before_the_page_could_join_it_is_shown_and_one_without_a_record_is_told(recorded):
+    """The page stayed with the run before it, as if nothing had happened."""
+
+    async def play():
+        runs = Short()
+        viewer = Viewer(runs, None, from_start=True)
+        await viewer.open("first")
+        following = asyncio.create_task(viewer.follow_runs())
+        runs.begin("quick", "runs/second")
+        while viewer.session is None or viewer.session.run.id != "quick":
+            await asyncio.sleep(0.01)
+        assert state(viewer.session)["tick"] == 1500
+        assert (viewer.listing()["shown"], viewer.listing()["missed"]) == ("second", "")
+        await asyncio.sleep(0.3)
+        runs.begin("lost", "runs/nowhere")
+        while not viewer.why:
+            await asyncio.sleep(0.01)
+        assert viewer.listing()["missed"] == 'Run lost, "run lost", ended before its first tick; its terminal says why.'
+        assert viewer.session.run.id == "quick"
+        await asyncio.sleep(0.3)
+        runs.begin("next", "runs/first")
+        while viewer.session.run.id != "next":
+            await asyncio.sleep(0.01)
+        assert viewer.listing()["missed"] == ""
+        following.cancel()
+
+    to_its_end(play())
+
+
+class Short(LiveRuns):
+    """Runs that are over as soon as somebody tries to join them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.present: list[Any] = []
+
+    def begin(self, name: str, out: str) -> None:
+        self.present = [SimpleNamespace(id=name, title=f"run {name}", out=out, is_here=True, make_context=self.end)]
+
+    def end(self) -> Any:
+        self.present = []
+        raise Aborted
+
+    def live(self) -> Any:
+        return self.present
+
+    def has_launcher(self, run: Any) -> bool:
+        return False
 
 
 def test_a_loop_with_an_element_that_is_not_installed_has_no_limit_of_stiffness(recorded):

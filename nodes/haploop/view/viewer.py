@@ -14,7 +14,7 @@ from haploop.view.draw.snapshot import Viewport, snapshot
 from haploop.view.receive.ingest import Backfill
 from haploop.view.receive.past_session import PastSession
 from haploop.view.receive.run_session import RunSession
-from haploop.view.receive.runs import CommandFailed, PastRun, Run, Runs
+from haploop.view.receive.runs import CommandFailed, PastRun, Run, Runs, is_live
 
 # Updates per second, at which telemetry is received and shown.
 UPDATE_HZ = 31.5
@@ -87,13 +87,18 @@ class Viewer:
         while True:
             run, joined = await self._next_run()
             session = await self._join(run)
+            found = session or await self._missed(run)
             if not joined.done():
-                joined.set_result(session is not None)
-            if session is None:
+                joined.set_result(found is not None)
+            if found is None:
                 self.why = _NOT_BEGUN.format(run.id, run.title)
                 self._go_back(run)
                 continue
-            self.session = self._followed = session
+            self.session = self._followed = found
+            self.why, self._listed = "", (-math.inf, {})
+            if session is None:
+                await self._complete(found)
+                continue
             tasks = [asyncio.create_task(session.clock.keep_asking())]
             if self._from_start:
                 tasks.append(asyncio.create_task(self._backfill(session)))
@@ -118,8 +123,9 @@ class Viewer:
     def listing(self) -> Message:
         """Returns the live runs and the recorded ones, looked for now and then, and which are on show.
 
-        ``overlay_diverged`` tells whether the numbers of the run drawn over it left every bound, ``overlay_end_s`` when
-        that run ended, ``stays`` whether the page keeps its run when that has ended.
+        ``missed`` is a sentence on a run that could not be shown, ``overlay_diverged`` tells whether the numbers of the
+        run drawn over it left every bound, ``overlay_end_s`` when that run ended, ``stays`` whether the page keeps its
+        run when that has ended.
         """
         if wall_clock.monotonic() - self._listed[0] > _LIST_S:
             live, self._past = self._runs.live(), self._runs.past()
@@ -133,6 +139,7 @@ class Viewer:
             "shown": self.session and self._listed_as(self.session),
             "title": self.session and self.session.scene.title,
             "stays": self._stays,
+            "missed": self.why,
             "overlay": self.overlay and self.overlay.run.id,
             "overlay_diverged": bool(behind) and behind["verdict"] == "diverged",
             "overlay_end_s": self.overlay and self.overlay.end_s,
@@ -207,16 +214,33 @@ class Viewer:
             self._notify_pages()
             await asyncio.sleep(_IDLE_TURN_S)
 
-    def _is_live(self, run: Run) -> bool:
-        return run.id in [live.id for live in self._runs.live()]
-
     async def _join(self, run: Run) -> RunSession | None:
         """Joins a run as soon as it has begun; returns None if it is gone by then."""
-        while self._is_live(run):
+        while is_live(self._runs, run):
+            joining = asyncio.create_task(asyncio.to_thread(RunSession, self._runs, run))
+            while not joining.done():
+                self._notify_pages()
+                await asyncio.wait([joining], timeout=_IDLE_TURN_S)
             try:
-                return await asyncio.to_thread(RunSession, self._runs, run)
+                return joining.result()
             except (Refused, Aborted):
                 await self._idle(_LOOK_S)
+        return None
+
+    async def _missed(self, run: Run) -> RunSession | None:
+        """Reads the record of a run that was over before it could be joined; returns None where it left none."""
+        for _ in range(_LOOKS):
+            is_last = not self._runs.has_launcher(run)
+            if record := self._runs.record_of(run):
+                try:
+                    session = await asyncio.to_thread(PastSession, record)
+                except (OSError, LogError, ValueError):
+                    return None
+                session.run, session.given_up = run, False
+                return session
+            if is_last:
+                return None
+            await self._idle(_LOOK_S)
         return None
 
     async def _receive(self, session: RunSession) -> None:
@@ -227,7 +251,7 @@ class Viewer:
             now = wall_clock.monotonic()
             if now >= gone_due:
                 gone_due = now + 1.0
-                if not self._is_live(session.run):
+                if not is_live(self._runs, session.run):
                     session.end_without_launcher()
             due = max(due + 1.0 / UPDATE_HZ, now)
             await asyncio.sleep(due - now)

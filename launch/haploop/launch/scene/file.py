@@ -12,7 +12,7 @@ from haploop.launch.scene.events import in_order_of_time
 from haploop.launch.scene.mistakes import COMMAND_LINE, SceneError, shown
 from haploop.launch.scene.reading.layers import Layers, lay_overrides, read_layers
 from haploop.launch.scene.reading.lines import KeyPath, line_in
-from haploop.launch.scene.reading.shorthand import put_in_full
+from haploop.launch.scene.reading.shorthand import put_in_full, told_of_recording
 from haploop.launch.scene.unmodelled import demand_modelled
 from haploop.protocol.installed import all_brought
 from haploop.protocol.scene.scene import Scene
@@ -90,6 +90,13 @@ def places(path: Path, overrides: Sequence[str], keys: Sequence[str]) -> list[st
         return [""] * len(keys)
     lay_overrides(layers, overrides)
     return [_place(layers, key) for key in keys]
+
+
+def recording_told(path: Path, overrides: Sequence[str]) -> str:
+    """Returns a sentence on how the recorded hand force of a valid scene is read; "" where there is none."""
+    layers = read_layers(path)
+    lay_overrides(layers, overrides)
+    return told_of_recording(layers)
 
 
 def _place(layers: Layers, name: str) -> str:

@@ -21,7 +21,7 @@ from haploop.protocol.transport.observer import Observer
 from haploop.protocol.transport.wire import Message
 from haploop.view.look.compare import Changes
 from haploop.view.receive.ingest import ingest
-from haploop.view.receive.runs import ClockAnswers, Run, Runs
+from haploop.view.receive.runs import ClockAnswers, Run, Runs, is_live
 from haploop.view.store.history import AtWork, History
 
 ROLE = "view"
@@ -49,7 +49,7 @@ class RunSession:
         self.run = run
         self._context = run.make_context()
         try:
-            self._observer = Observer(self._context, ROLE, run.clock, _STREAMS)
+            self._observer = Observer(self._context, ROLE, run.clock, _STREAMS, lambda: is_live(runs, run))
         except (Refused, Aborted):
             self._context.destroy(linger=0)
             raise

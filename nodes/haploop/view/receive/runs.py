@@ -75,6 +75,10 @@ class Runs(Protocol):
         """Returns recorded runs that may be opened, the newest first."""
         ...
 
+    def record_of(self, run: Any) -> PastRun | None:
+        """Returns the record of a run that was live; None where it left none that can be read here."""
+        ...
+
     def stiffness_limit(self, scene: Scene) -> float | str | None:
         """Returns the largest wall stiffness at which a loop is stable by its linear map, N/m, or why none is known."""
         ...
@@ -86,6 +90,11 @@ class Runs(Protocol):
     def ask(self, run: Any, verb: str, arguments: Message) -> tuple[str, Message]:
         """Sends a command to a run; returns its answer, a sentence and data, or raises CommandFailed."""
         ...
+
+
+def is_live(runs: Runs, run: Run) -> bool:
+    """Returns whether a run is among the live ones."""
+    return run.id in [live.id for live in runs.live()]
 
 
 class ClockAnswers:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from typing import Any
 
 import zmq
@@ -81,11 +82,16 @@ class ClockClient:
         self.malformed = 0
         self.refused = ""
 
-    def join(self, endpoints: dict[str, str], lossless: bool = True) -> Message:
+    def join(
+        self, endpoints: dict[str, str], lossless: bool = True, goes_on: Callable[[], bool] = lambda: True
+    ) -> Message:
         """Asks to take part, waits for the WELCOME and returns its fields by name.
 
+        Args:
+            goes_on: tells whether the run is still there; called four times a second while nothing comes.
+
         Raises:
-            Refused: the clock refused, could not be reached, or sent nothing for 20 s.
+            Refused: the clock refused, could not be reached, sent nothing for 20 s, or the run has ended.
             Aborted: the run failed before it began.
         """
         if any(with_host_of(address, "") != address for address in endpoints.values()):
@@ -100,6 +106,8 @@ class ClockClient:
                     raise Refused(why)
                 if self._connection and self._connection.lost_s() > self._grace_s:
                     raise Refused(self._lost)
+                if not goes_on():
+                    raise Refused("The run has ended.")
                 continue
             frame = self._receive()
             if frame and frame.name == "WELCOME":

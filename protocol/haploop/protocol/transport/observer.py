@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import zmq
 
@@ -25,6 +25,7 @@ class Observer:
     Args:
         role: name under which the clock lists it.
         listens: roles whose telemetry it receives.
+        goes_on: tells whether the run is still there; called while the clock does not answer.
 
     Attributes:
         welcome: run, scene, timebase, endpoints, granted and context, as the clock gave them.
@@ -34,8 +35,15 @@ class Observer:
         Refused: the clock did not let it join.
     """
 
-    def __init__(self, context: zmq.Context[zmq.Socket[bytes]], role: str, clock: str, listens: Sequence[str]) -> None:
-        self._context, self._role, self._clock = context, role, clock
+    def __init__(
+        self,
+        context: zmq.Context[zmq.Socket[bytes]],
+        role: str,
+        clock: str,
+        listens: Sequence[str],
+        goes_on: Callable[[], bool] = lambda: True,
+    ) -> None:
+        self._context, self._role, self._clock, self._goes_on = context, role, clock, goes_on
         self._machine = machine_of(context)
         self._taken = 0
         self._events: list[tuple[int, Event]] = []
@@ -47,7 +55,7 @@ class Observer:
     def _join(self) -> ClockClient:
         client = ClockClient(self._context, self._role, self._clock, "")
         try:
-            self.welcome = client.join({}, lossless=False)
+            self.welcome = client.join({}, lossless=False, goes_on=self._goes_on)
         except BaseException:
             client.close()
             raise

@@ -72,7 +72,7 @@ class ObservedRun:
         give_up = time.monotonic() + _BEGINS_WITHIN_S
         while not is_over(self._run):
             try:
-                return Observer(self._context, role, self._run.clock, tuple(PROCESSES))
+                return Observer(self._context, role, self._run.clock, tuple(PROCESSES), lambda: not is_over(self._run))
             except Refused:
                 if time.monotonic() > give_up:
                     raise

@@ -107,6 +107,16 @@ class LiveRuns:
             self._recorded[key] = RecordedRun.of_summary(*key)
         return [self._recorded[file, ended_s] for ended_s, file in found[:_MOST_PAST]]
 
+    def record_of(self, run: LiveRun) -> RecordedRun | None:
+        """Returns the record of a run that was live, from its summary; None where there is none on this machine."""
+        from haploop.logger.summary import SUMMARY
+
+        file = Path(run.out) / SUMMARY
+        with suppress(OSError):
+            if run.is_here:
+                return RecordedRun.of_summary(file, file.stat().st_mtime)
+        return None
+
     def stiffness_limit(self, scene: Scene) -> float | str:
         """Returns the largest stiffness with which the linear map of a loop is stable, N/m, or why there is none.
 

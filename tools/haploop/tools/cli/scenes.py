@@ -51,6 +51,7 @@ def check(
     """Report what is wrong or probably unintended in a scene."""
     from haploop.launch.plan.effects import notes
     from haploop.launch.runs.start import load_tried
+    from haploop.launch.scene.file import recording_told
     from haploop.launch.scene.mistakes import SceneError
     from haploop.launch.scene.schema import json_schema
     from haploop.launch.scene.toml_writer import to_toml
@@ -79,8 +80,11 @@ def check(
         print(to_toml(tables), end="", flush=True)
         with_a = " with your own plant (--node plant=COMMAND)" if hand_is_unmodelled(resolved) else ""
         no_wall = "" if resolved.wall else " It has no [wall]: nothing pushes the device back."
-        if notes(resolved, kinds):
+        recording = recording_told(scene, set or [])
+        if recording or notes(resolved, kinds):
             print(file=sys.stderr)  # sets the notes apart from all that is above
+        if recording:
+            print(recording, file=sys.stderr)
         noted = print_notes(resolved, kinds, scene, set or [])
         but = " The notes above say what is probably unintended." if noted else ""
         print(f"{scene} can be run{with_a}.{no_wall}{but}", file=sys.stderr)

@@ -23,8 +23,8 @@ from haploop.protocol.names import nearest
 
 Floats = NDArray[np.float64]
 
-# The table begins within so many rows.
-_MOST_ABOVE = 50
+# The table begins within so many rows; so many below a number among words tell whether those are data.
+_MOST_ABOVE, _BELOW = 50, 3
 _BLOCK_ROWS = 16_384
 # Names by which columns of times and forces are known; without a unit, times are seconds under the last.
 SECONDS = "seconds"
@@ -52,7 +52,8 @@ class DelimitedFile:
     """Reads text with one row per line; it may have title lines, a header, a row of units, lines that begin with #, and
     empty lines.
 
-    The first row with a number begins the table: its cells are separated by tabs, semicolons, commas or blanks,
+    The table begins with the first row of numbers, or the first with a number among words that three rows with
+    numbers follow, or all there are: its cells are separated by tabs, semicolons, commas or blanks,
     whichever of these it contains first in this order. With semicolons a comma is taken for the decimal point. The row
     above is the header; where half of its cells are units and the row above that has as many cells, it holds the units
     and the row above it is the header. Anything above is a title.
@@ -62,9 +63,12 @@ class DelimitedFile:
         title: number of lines above the header.
     """
 
-    def __init__(self, path: Path) -> None:
-        """Finds delimiter and columns from the beginning of the file; raises RecordingError without a file or a row."""
-        self.path = path
+    def __init__(self, path: Path, may_be_empty: bool = True) -> None:
+        """Finds delimiter and columns from the beginning of the file; raises RecordingError without a file or a row.
+
+        ``may_be_empty`` tells whether whoever reads it can leave out a row with an empty cell.
+        """
+        self.path, self._may_be_empty = path, may_be_empty
         with _open_lines(self.path) as lines:
             rows, comment = list[str](), ""
             for line in filter(str.strip, lines):
@@ -77,7 +81,11 @@ class DelimitedFile:
         if not rows:
             raise RecordingError(f"{path} is empty: a line for every sample was expected.")
         self._above, self._delimiter = next(
-            ((above, mark) for above, row in enumerate(rows) if _has_number(row, mark := _delimiter(row))),
+            (
+                (above, _delimiter(row))
+                for above, row in enumerate(rows)
+                if _begins(row, rows[above + 1 : above + 1 + _BELOW])
+            ),
             (1, _delimiter(rows[0])),
         )
         above = self._cells(rows[: self._above])
@@ -178,8 +186,8 @@ class DelimitedFile:
         except ValueError:
             name = self.columns[index].name
             raise RecordingError(
-                f"Line {line} of {self.path}: a number was expected in column {name}, not {cells[index].strip()!r}. "
-                "Leave a cell without a value empty."
+                f"Line {line} of {self.path}: a number was expected in column {name}, not {cells[index].strip()!r}."
+                f"{' Leave a cell without a value empty.' * self._may_be_empty}"
             ) from None
 
     def _number_text(self, cell: str) -> str:
@@ -202,8 +210,17 @@ def _number_text(cell: str, delimiter: str | None) -> str:
     return text.replace(",", ".") if delimiter == ";" else text
 
 
-def _has_number(row: str, delimiter: str | None) -> bool:
-    return any(is_number(_number_text(cell, delimiter)) for cell in _split([row], delimiter)[0] if cell.strip())
+def _begins(row: str, following: Sequence[str]) -> bool:
+    """Tells whether a row begins the table: ``Recorded 2026`` above a header is a title."""
+    numbers, cells = _numbers(row)
+    return bool(numbers) and (numbers == cells or all(_numbers(line)[0] for line in following))
+
+
+def _numbers(row: str) -> tuple[int, int]:
+    """Returns how many cells of a row are numbers, and how many are not empty."""
+    delimiter = _delimiter(row)
+    cells = [cell for cell in _split([row], delimiter)[0] if cell.strip()]
+    return sum(is_number(_number_text(cell, delimiter)) for cell in cells), len(cells)
 
 
 def _is_unit(cell: str) -> bool:

@@ -10,8 +10,12 @@ from pydantic_core import PydanticCustomError
 from haploop.launch.scene.mistakes import COMMAND_LINE
 from haploop.launch.scene.models import number_of
 from haploop.launch.scene.reading.layers import Layers
+from haploop.launch.scene.reading.lines import KeyPath
 from haploop.protocol.quantity import si
 from haploop.protocol.scene.table import Table
+
+_FORCE: KeyPath = ("hand", "force")
+_FILE, _COLUMNS = (*_FORCE, "file"), ("time_column", "force_column")
 
 
 class CountedRange(Table):
@@ -59,30 +63,47 @@ def _of_a_count(name: str, value: object) -> str:
     return (_IN_BITS if value == 1 << bits else _IN_COUNTS).format(value, bits)
 
 
-def _read_recording(layers: Layers) -> None:
-    """Puts the samples of a recorded hand force in place of its file, so that the scene can be run on its own."""
+def told_of_recording(layers: Layers) -> str:
+    """Returns a sentence on how the recorded hand force of valid layers is read; "" where there is none."""
+    if (force := _recorded(layers)) is None:
+        return ""
+    from haploop.launch.scene.reading.trace import told
+
+    return told(*_file_and_columns(layers, force))
+
+
+def _recorded(layers: Layers) -> dict[str, Any] | None:
     hand = layers.data.get("hand")
     force = hand.get("force") if isinstance(hand, dict) else None
-    if not isinstance(force, dict) or force.get("kind") != "trace" or "file" not in force:
+    return force if isinstance(force, dict) and force.get("kind") == "trace" and "file" in force else None
+
+
+def _file_and_columns(layers: Layers, force: dict[str, Any]) -> tuple[Path, str | None, str | None]:
+    """Returns the file of a recorded force, and the columns of times and forces where they are named."""
+    origin = layers.origin(_FILE)
+    time, newton = (str(force[name]) if name in force else None for name in _COLUMNS)
+    return (Path() if origin == COMMAND_LINE else Path(origin).parent) / force["file"], time, newton
+
+
+def _read_recording(layers: Layers) -> None:
+    """Puts the samples of a recorded hand force in place of its file, so that the scene can be run on its own."""
+    if (force := _recorded(layers)) is None:
         return
     from haploop.launch.scene.reading.trace import RecordingError, read_trace  # numpy, only where a file is read
 
-    path = ("hand", "force")
-    key, times, forces = (*path, "file"), [0.0], [0.0]
-    columns = {name: force[f"{name}_column"] for name in ("time", "force") if f"{name}_column" in force}
+    times, forces = [0.0], [0.0]
+    given = [name for name in _COLUMNS if name in force]
     if "time" in force or "force" in force:
-        layers.complain(key, "A trace has either a file or the lists time and force.")
+        layers.complain(_FILE, "A trace has either a file or the lists time and force.")
     elif not isinstance(force["file"], str):
-        layers.complain(key, "It must be the path of a text file of time and force, such as a CSV.")
-    elif wrong := [name for name, value in columns.items() if type(value) not in (str, int)]:
-        layers.complain((*path, f"{wrong[0]}_column"), "It must be the name of a column, or its number from 1.")
+        layers.complain(_FILE, "It must be the path of a text file of time and force, such as a CSV.")
+    elif wrong := [name for name in given if type(force[name]) not in (str, int)]:
+        layers.complain((*_FORCE, wrong[0]), "It must be the name of a column, or its number from 1.")
     else:
-        origin = layers.origin(key)
-        folder = Path() if origin == COMMAND_LINE else Path(origin).parent
         try:
-            times, forces = read_trace(folder / force["file"], **{name: str(value) for name, value in columns.items()})
+            times, forces = read_trace(*_file_and_columns(layers, force))
         except RecordingError as error:
-            layers.complain(key, str(error))
-    for name in ("file", *(f"{name}_column" for name in columns)):
+            layers.complain(_FILE, str(error))
+    for name in ("file", *given):
         del force[name]
     force |= {"time": times, "force": forces}

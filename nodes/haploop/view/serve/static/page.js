@@ -97,7 +97,7 @@ function showState() {
     swapForm.update(state.options);
     setForm.update(state.options, state);
   }
-  allow(phase(), state.why, runs.listing?.stays);
+  allow(phase(), state.why, runs.listing);
   runs.mark();
   if (snapshot) scrubber.show(snapshot, marks); // the last tick comes after the last picture
   view.update(!["running", "paused"].includes(phase()));

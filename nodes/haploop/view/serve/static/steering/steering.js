@@ -14,12 +14,16 @@ const REASONS = {
 /** Why nothing can be steered now; "" when it can. */
 export const obstacle = (phase) => REASONS[phase] ?? (maySteer() ? "" : WATCHING);
 
-/** Enable or disable all that steers, and say why; `stays`: whether the page stays with a run that has ended. */
-export function allow(phase, why, stays = false) {
+/**
+ * Enable or disable all that steers, and say why; `stays`: whether the page stays with a run that has ended, `missed`: a
+ * sentence on a run that could not be shown.
+ */
+export function allow(phase, why, { stays = false, missed = "" } = {}) {
   const reason = obstacle(phase);
   for (const fieldset of document.querySelectorAll("fieldset[data-steers]")) fieldset.disabled = reason !== "";
   const told = { waiting: "", ended: stays ? reason : `${reason} A run that is started now will appear here.` }[phase] ?? reason; // the middle of the page says that it waits
-  put(byId("notice"), [told, why && why[0].toUpperCase() + why.slice(1).replace(/[^.]$/, "$&.")].filter(Boolean).join(" "));
+  const because = why && why[0].toUpperCase() + why.slice(1).replace(/[^.]$/, "$&.");
+  put(byId("notice"), [told, because, missed !== why && missed].filter(Boolean).join(" "));
 }
 
 export class Steering {
