@@ -110,8 +110,8 @@ def told_with(row: Changed, values: Values = (5.0,)) -> dict[str, str]:
 
 
 def changed(factor: float, alone_factor: float) -> Changed:
-    base = Borne(Limit(1000.0, math.inf), Limit(1000.0, math.inf))
-    some = Borne(Limit(1e3 * factor, math.inf), Limit(1e3 * alone_factor, math.inf))
+    base = Borne(*[Limit(1000.0, 1001.0)] * 2)
+    some = Borne(*[Limit(1e3 * times, 1e3 * times + 1.0) for times in (factor, alone_factor)])
     return Changed.from_borne("delay halved", some, base)
 
 
@@ -191,6 +191,18 @@ def test_a_factor_within_what_both_limits_are_known_to_is_told_as_no_change() ->
     assert times(1600.0, 1700.0) == ["1.6 N/mm", "0.79", "2.0 N/mm", "same"]
 
 
+def test_what_its_tolerance_makes_the_same_in_the_table_neither_gains_nor_loses_in_the_answer() -> None:
+    """A limit of 0.59 times of which no stiffer wall was tried stood under "loses most", and as "same" in its table."""
+    base = Borne(Limit(1000.0, 1060.0), Limit(0.0, 1.0))
+    row_of = Changed.from_borne("delay halved", Borne(Limit(590.0, math.inf), Limit(0.0, 1.0)), base)
+    told = told_with(row_of)
+    assert told["loses most"] == "no single change that was tried costs a sixth"
+    less = Changed.from_borne("delay halved", Borne(Limit(590.0, 620.0), Limit(0.0, 1.0)), base)
+    assert told_with(less)["loses most"] == "delay halved: 0.59 times (1.0 without an element)"
+    nothing = replace(ADVICE, changed=(less,), without=(), unchanged=Changed.from_borne("unchanged", base, base))
+    assert row(shown(changes_table(nothing)), "delay halved")[-1] == "–", "no wall is borne that could be multiplied"
+
+
 def test_an_element_with_which_no_wall_as_soft_as_was_tried_is_safe_is_told_with_that_wall() -> None:
     failure = Failure("a case", 1.0, gone=False)
     assert format_limit(Limit(0.0, 310.0, failure)) == "below 0.31 N/mm"
@@ -208,7 +220,7 @@ def test_the_line_of_the_scene_that_breaks_says_on_which_wall_that_is() -> None:
     stiffer = ": the case that breaks first, with a wall of 0.67 N/mm, on which the swing is plainer"
     assert words(665.0, "pushed").startswith(stiffer)
     assert words(390.0, "pushed") == ": the case that breaks first, with a wall of 0.39 N/mm"
-    assert "to the end of the quarter second" in words(390.0, "window")
+    assert "to the end of the time in which" in words(390.0, "window")
 
 
 def test_the_stages_of_an_advice_are_told_by_their_place_among_all() -> None:

@@ -50,11 +50,11 @@ def test_the_books_of_a_run_that_was_changed_in_its_last_window_do_not_stand_bes
         ({"delay": "undecided", "friction": "rests"}, "friction."),
         (
             {"delay": "rests", "friction": "swings on", "element 0 (damping)": "rests"},
-            "delay and element 0 (damping) together: it rests without any one of them.",
+            "delay and element 0 (damping) together: it rests as soon as one of them is left out.",
         ),
         (
             {"delay": "swings on", "friction": "swings on", "all": "rests"},
-            "no single part, since it swings without any one of them.",
+            "no single part, since it swings whichever one is left out.",
         ),
         ({"delay": "swings on", "friction": "swings on", "all": "swings on"}, "not found by these trials; what they"),
         ({"delay": "swings less", "friction": "swings on"}, "mostly delay."),

@@ -35,13 +35,13 @@ _DOES = {
     "undecided": "is undecided without {}",
 }
 _ALL = {"all": "all of these at once"}
-_SEVERAL = "{} together: it rests without any one of them"
+_SEVERAL = "{} together: it rests as soon as one of them is left out"
 _MOSTLY = "mostly {}"
 _ANY = "{}, either of which makes most of it"
 _BOTH = "{} together: taking out any one of them keeps it within its limit"
 # Words for one part and for several, by what the loop does without it.
 _CAUSES = ("rests", "{}", _SEVERAL), ("swings within its limit", _MOSTLY, _BOTH), ("swings less", _MOSTLY, _ANY)
-_NO_SINGLE_ONE = "no single part, since it swings without any one of them"
+_NO_SINGLE_ONE = "no single part, since it swings whichever one is left out"
 _NOT_FOUND = "not found by these trials; what they leave is the wall itself, the hand, and the estimators"
 _UNTOLD = "not determined by these trials"
 # Below this share most of what is seen is the hand's motion, noise, or dies away.

@@ -67,6 +67,7 @@ SAFE_MEANS = (
 class Changed:
     """What a changed loop bears in the hardest corners, also as a multiple of what it bears without the change.
 
+    A multiple is 1 where it may be 1 within the tolerances of both limits, and 0 where there is nothing to multiply.
     ``limit`` is with the element tuned again or with none, whichever bears more; ``alone`` is without an element.
     """
 
@@ -81,8 +82,14 @@ class Changed:
     def from_borne(cls, words: str, borne: Borne, base: Borne) -> Self:
         """Makes it from what the loop bears with and without the change."""
         limits = (borne.limit, base.limit), (borne.alone, base.alone)
-        factor, alone = (of.stiffness_N_m / to.stiffness_N_m if to.stiffness_N_m else 0.0 for of, to in limits)
+        factor, alone = (_multiple(*pair) for pair in limits)
         return cls(words, borne.limit, factor, borne.alone, alone, borne.values)
+
+
+def _multiple(of: Limit, base: Limit) -> float:
+    if of.stiffness_N_m <= base.fails_N_m and base.stiffness_N_m <= of.fails_N_m:
+        return 1.0
+    return of.stiffness_N_m / base.stiffness_N_m if base.stiffness_N_m else 0.0
 
 
 @dataclass(frozen=True)

@@ -102,7 +102,7 @@ def breaks_words(found: Advice) -> str:
     assert scene.wall
     assert broken
     if scene.run.verdict != "pushed":
-        return ": the case that breaks first, to the end of the quarter second in which it is felt"
+        return ": the case that breaks first, to the end of the time in which it is felt"
     shown, told = format_stiffness(scene.wall.stiffness), format_stiffness(broken[0])
     return f": the case that breaks first, with a wall of {shown}" + (_STIFFER.format(told) if shown != told else "")
 

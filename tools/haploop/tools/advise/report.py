@@ -141,7 +141,9 @@ def _known(told: Advice) -> list[tuple[str, str]]:
 
 def _times(told: Advice, row: Changed) -> str:
     words = _TIMES.format(row.words, fixed(row.factor, 2))
-    return words + (_TIMES_ALONE.format(fixed(row.alone_factor, 2)) if told.found.advised.values else "")
+    if not told.found.advised.values or not told.unchanged.alone.stiffness_N_m:
+        return words
+    return words + _TIMES_ALONE.format(fixed(row.alone_factor, 2))
 
 
 def assumes(told: Advice, right: Best) -> str:
@@ -262,16 +264,17 @@ def _changes(told: Advice) -> Table:
     for row in (told.unchanged, *told.changed, *told.without):
         style = "bold" if max(row.factor, row.alone_factor) >= _TELLS else ""
         base = told.unchanged
-        times = [_factor(row.factor, row.limit, base.limit), _factor(row.alone_factor, row.alone, base.alone)]
+        times = [_factor(row.factor, base.limit), _factor(row.alone_factor, base.alone)]
         numbers = (format_limit(row.limit), times[0], format_limit(row.alone), times[1])
         table.add_row(row.words, *numbers[: len(heads)], style=style)
     return table
 
 
-def _factor(factor: float, limit: Limit, base: Limit) -> str:
-    """Formats a factor; "same" if it may be 1 within the tolerances of both limits."""
-    is_same = limit.stiffness_N_m <= base.fails_N_m and base.stiffness_N_m <= limit.fails_N_m
-    return "same" if is_same else fixed(factor, 2)
+def _factor(factor: float, base: Limit) -> str:
+    """Formats a multiple of a limit; "same" for 1, a dash where no wall is borne that it could multiply."""
+    if not base.stiffness_N_m:
+        return "–"
+    return "same" if factor == 1.0 else fixed(factor, 2)
 
 
 def _assumed(told: Advice) -> Table:
