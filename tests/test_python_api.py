@@ -226,6 +226,8 @@ def test_numbers_of_the_summary_come_with_their_units(scene: Scene) -> None:
     for name, key in (("force_max", "extremes.force_max_N"), ("Oscillation_m", "window.oscillation_m")):
         with pytest.raises(KeyError, match=f"did you mean {key}"):
             result.quantity(name)
+    with pytest.raises(TypeError, match=r"A scene is a file, or a name that haploop scenes lists, but 3 was given."):
+        run(3)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match=r"out must be a directory, .* to change a scene, use load\(scene\).set"):
         run(scene, {"wall.stiffness": 300.0})  # pyright: ignore[reportArgumentType]
     assert repr(result).startswith(f"<{result.verdict}: ")

@@ -38,6 +38,7 @@ def test_lines_of_a_damaged_store_are_passed_over_and_whole_ones_of_two_advices_
         lines.write(b'{"key": "c", "fails": {"case\n\xff\n[1]\n{}\n{"key": "d", "fails": {"no": 1}}\n{"key": "e", "fa')
     one.add({"f": None}, JOBS)
     assert Store(file).known == {"a": None, "b": failure, "f": None}
+    assert b"" not in file.read_bytes().split(b"\n")[:-1], "no line is empty"
 
 
 def test_a_line_of_the_store_says_which_wall_was_tried_with_what_and_what_it_did(tmp_path):

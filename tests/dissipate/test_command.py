@@ -222,3 +222,9 @@ def test_an_element_that_answers_to_the_forces_of_its_loop_is_refused(recording:
     kind = "passivity-controller"
     result = dissipate(recording, "--element", f"{kind} damping=2")
     refused(result, kind, "forces and energies", "haploop run")
+
+
+def test_a_scene_is_no_recording_and_is_said_to_be_none(tmp_path):
+    (tmp_path / "s.toml").write_text('title = "a scene"\n')
+    result = dissipate(tmp_path / "s.toml")
+    assert (result.exit_code, "is a scene or a sweep, not a recording" in result.stderr) == (2, True)

@@ -31,9 +31,9 @@ def test_what_is_drawn_in_clusters_that_agree_tells_no_more_than_one_of_each() -
 
 
 def test_the_interval_of_a_mean_is_students_and_infinite_for_one() -> None:
-    """Two values: 12.706 s / sqrt(2) to either side."""
+    """Two values: t s / sqrt(2) to either side, with t = tan(0.475 pi), as Student's t with one degree is Cauchy's."""
     found = mean_interval([1.0, 3.0])
-    assert found.high - found.value == pytest.approx(12.706 * math.sqrt(2.0) / math.sqrt(2.0))
+    assert found.high - found.value == pytest.approx(math.tan(0.475 * math.pi))
     assert math.isinf(mean_interval([1.0]).high)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from haploop.controller.controller import Controller
 from haploop.controller.dissipation import Element, ElementError
-from haploop.controller.dissipation.element import raised
+from haploop.controller.dissipation.element import Motion, raised
 from haploop.controller.dissipation.registry import load_source
 from haploop.launch.runs.start import prepare, run
 from haploop.launch.scene.check import resolve
@@ -27,6 +27,21 @@ def test_an_error_in_the_kept_copy_of_a_plugin_names_the_file_as_its_user_wrote_
     )
     brake = load_source(source, "/runs/one/plugins/brake-0123456789ab.py")["brake"]
     assert raised(ValueError("enough"), brake) == "ValueError: enough (brake.py, line 7)"
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("velocity", "It holds x, v, a, a_before, contact, inward and period_s, and what the element's class asks for"),
+        ("total_energy", 'An element gets only what its class asks for: asks = ("total_energy",)'),
+    ],
+)
+def test_a_wrong_name_of_the_motion_is_answered_with_what_it_holds(name, hint):
+    with pytest.raises(AttributeError) as wrong:
+        getattr(Motion(0.001, 1.0), name)
+    told = raised(wrong.value)
+    assert told.startswith(f"AttributeError: 'Motion' object has no attribute '{name}'")
+    assert told.endswith(f"). {hint}")
 
 
 FORGETS = """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -164,7 +165,10 @@ def load(
         SceneError: the scene cannot be run; the error holds every mistake.
         PluginError: a file defines nothing usable, or a class is not a usable element.
         ElementError: an element's own code does not take its parameters.
+        TypeError: the path is none.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise TypeError(f"A scene is a file, or a name that haploop scenes lists, but {path!r:.60} was given.")
     kinds, files = registry(), {}
     for plugin in (paths := tuple(map(Path, plugins))):
         found = load_plugin(plugin)

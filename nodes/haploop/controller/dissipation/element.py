@@ -19,6 +19,8 @@ class ElementError(Exception):
 
 
 _HERE = Path(__file__).parent
+_ASK = '. An element gets only what its class asks for: asks = ("{}",)'
+_HOLDS = ". It holds x, v, a, a_before, contact, inward and period_s, and what the element's class asks for"
 _NO_PLUGIN = (_HERE.parent, Path(__file__), _HERE / "registry.py", Path(plugin_file.__file__))
 
 
@@ -43,8 +45,9 @@ def raised(error: BaseException | None, kind: type[Element] | None = None) -> st
     """Returns what an element raised, with the file and the line of its code."""
     if kind and kind.memory is not None and "unpack" in str(error) and not places_of(error):
         return f"TypeError: force must return the force and the memory, as in: return f, memory{place_in(kind)}"
-    name = getattr(error, "name", None)
-    hint = f'. An element gets only what its class asks for: asks = ("{name}",)' if name in ASKABLE else ""
+    hint = ""
+    if isinstance(error, AttributeError) and isinstance(error.obj, Motion):
+        hint = _ASK.format(error.name) if error.name in ASKABLE else _HOLDS
     return f"{type(error).__name__}: {error}{place_in(kind, error)}{hint}"
 
 

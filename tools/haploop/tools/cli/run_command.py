@@ -39,7 +39,7 @@ def run(
         str | None, typer.Option(help="free, or simulated seconds per second [free; 1 with --view]", show_default=False)
     ] = None,
     clock: Annotated[
-        str, typer.Option(metavar="run|plant", help="who owns the time; plant: a device that runs on its own")
+        str, typer.Option(metavar="OWNER", help="who owns the time: run, or plant, a device that runs on its own")
     ] = "run",
     view: Annotated[bool, typer.Option("--view", help="show the run in the browser, where it can be steered")] = False,
     until_closed: UntilClosed = False,

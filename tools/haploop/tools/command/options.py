@@ -60,7 +60,7 @@ SweepFile = Annotated[
 Device = Annotated[
     str,
     typer.Argument(
-        help="a device that comes with haploop, or a scene",
+        help="a device that comes with haploop, a file with one, or a scene",
         show_default=False,
         autocompletion=complete("devices"),
     ),

@@ -31,6 +31,7 @@ from haploop.tools.figure.data import FigureError
 from haploop.tools.figure.style import write_figure
 from haploop.tools.render.terminal import console
 
+_A_SCENE = "{} is a scene or a sweep, not a recording: give a table of numbers as text, or the directory of a run."
 _OWN_COLUMNS = (
     "A log has its own columns, times, units and force: leave out the options that name them, which are for text files."
 )
@@ -174,6 +175,8 @@ def _open(request: Request, kinds: dict[str, type[Element]]) -> tuple[Recording,
         recording = LogRecording(path, scene, request.delay_s, selection.estimated_anew())
         return recording, make_scene_for_log(selection, path, scene, kinds)
 
+    if path.suffix == ".toml":
+        raise RecordingError(_A_SCENE.format(path))
     recording = TextRecording(path, request.layout, request.delay_s or 0.0)
     return recording, make_scene_for_text(selection, path, recording.period_s, recording.recorded, kinds)
 

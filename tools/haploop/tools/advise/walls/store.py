@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
@@ -113,12 +114,15 @@ class Store:
         self.known |= results
         if not self._file:
             return
-        lines = (
+        lines = [
             json.dumps(jobs[key].as_told() | {"fails": asdict(failure) if failure else None, "key": key})
             for key, failure in results.items()
-        )
-        with self._writable(), self._file.open("ab") as file:
-            file.write("\n".join(["", *lines, ""]).encode())
+        ]
+        with self._writable(), self._file.open("a+b") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.seek(max(0, size - 1))
+            after_broken = file.read(1) not in (b"", b"\n")
+            file.write("\n".join([""] * after_broken + [*lines, ""]).encode())
 
     @contextlib.contextmanager
     def _writable(self) -> Iterator[None]:
