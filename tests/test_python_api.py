@@ -1,4 +1,4 @@
-"""haploop.launch from Python: the same bits as the command line, scenes that never change, results with units."""
+"""Scenes and runs from Python: the same bits as the command line, scenes that never change, results with units."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Annotated
 import numpy as np
 import pytest
 
+from haploop.api import Scene, load, run
 from haploop.controller.dissipation import Element, ElementError, Motion, PluginError, Quantity, where
-from haploop.launch import Scene, load, run
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.spec import OutputError
 from haploop.logger import read

@@ -10,8 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from haploop.api import load, run
 from haploop.controller.dissipation import registry
-from haploop.launch import load, run
 from haploop.launch.runs.result import Result, unit_of
 from haploop.launch.scene.schema import json_schema
 from haploop.tools.render.terminal import markdown_table

@@ -13,7 +13,7 @@ from haploop.launch.scene.check import resolve
 from haploop.launch.scene.reading.layers import Layers
 from haploop.protocol.plugin_file import PluginError
 from haploop.protocol.ticks import Timebase
-from haploop.tools.cli import scenes
+from haploop.tools.cli import recorded
 from haploop.tools.executor.work import Work
 from helpers.scenes.least import LEAST
 
@@ -79,8 +79,8 @@ def test_what_an_element_prints_is_not_heard_again_where_its_run_is_judged_or_re
     sets = ["duration=0.02", "run.verdict=window", "wall.position=-1", 'dissipation=[{kind="loud"}]']
     run(prepare(FIG6C, sets, [tmp_path / "loud.py"], tmp_path / "run"), in_process=True)
     assert "heard" in capfd.readouterr().err
-    scenes.judge(tmp_path / "run")
-    scenes.replay(tmp_path / "run")
+    recorded.judge(tmp_path / "run")
+    recorded.replay(tmp_path / "run")
     said = capfd.readouterr()
     assert "contact" in said.out
     text = (tmp_path / "loud.py").read_text()

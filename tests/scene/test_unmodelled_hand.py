@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-import haploop.launch
+from haploop import api
 from haploop.launch.runs.start import prepare
 from haploop.launch.scene.file import load
 from haploop.launch.scene.mistakes import SceneError
@@ -61,8 +61,8 @@ def test_a_sweep_of_such_a_scene_is_refused_before_its_first_run(file: Path, tmp
 REFUSING: dict[str, Callable[[Path], object]] = {
     "load": load,
     "prepare": prepare,
-    "the Python interface": haploop.launch.load,
-    "a change of a scene": lambda _: haploop.launch.load(FIG6B).set({"hand.kind": "unmodelled"}),
+    "the Python interface": api.load,
+    "a change of a scene": lambda _: api.load(FIG6B).set({"hand.kind": "unmodelled"}),
 }
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from haploop.launch import load, run
+from haploop.api import load, run
 from haploop.protocol.ticks import Timebase
 from haploop.view.look.book_names import book_names
 from haploop.view.look.budget import budget

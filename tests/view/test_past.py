@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from haploop.launch import load, run
+from haploop.api import load, run
 from haploop.launch.runs.run_files import recorded_scene
 from haploop.logger.cause import likely_cause
 from haploop.protocol.scene.scene import ElementTable, Wall

@@ -1,4 +1,7 @@
-"""Dissipation elements: one per file, or one family, all of the same form."""
+"""Dissipation elements: one per file, or one family, all of the same form.
+
+``element`` is that form, ``damping`` the simplest.
+"""
 
 from haploop.controller.dissipation.element import Element, ElementError, Motion
 from haploop.controller.dissipation.registry import PluginError, load_plugin, registry

@@ -1,1 +1,4 @@
-"""The window at the end of a run, what is measured in it, and the verdict that follows."""
+"""The window at the end of a run, what is measured in it, and the verdict that follows.
+
+``window`` gathers it, ``measures`` finds numbers and word.
+"""

@@ -1,1 +1,4 @@
-"""The motion of one mass under held forces by the exact transition, and the force of the hand."""
+"""The motion of one mass under held forces by the exact transition, and the force of the hand.
+
+``one_mass`` moves it, ``transition`` holds the mathematics.
+"""

@@ -1,1 +1,4 @@
-"""The HTTP server on loopback: files, access control, and the connection of every page."""
+"""The HTTP server on loopback: files, access control, and the connection of every page.
+
+``server`` starts it, ``page`` serves one page.
+"""

@@ -1,1 +1,4 @@
-"""Bounded memory of a run: series at several levels of detail."""
+"""Bounded memory of a run: series at several levels of detail.
+
+``history`` holds it.
+"""

@@ -6,13 +6,13 @@ from typing import Annotated
 
 import typer
 
-from haploop.tools.cli.bundled import new, scenes
 from haploop.tools.cli.explain import explain
 from haploop.tools.cli.join import join
 from haploop.tools.cli.live_commands import attach, keys, pace, pause, resume, set_, status, step, stop, swap, undo
+from haploop.tools.cli.recorded import export, judge, replay
 from haploop.tools.cli.run_command import run
 from haploop.tools.cli.runs_beside import diff, plot
-from haploop.tools.cli.scenes import check, export, judge, plugins, replay
+from haploop.tools.cli.scenes import check, new, plugins, scenes
 from haploop.tools.cli.study_commands import advise, dissipate, paper, sweep
 from haploop.tools.cli.view import view
 from haploop.tools.compare.command import compare

@@ -1,10 +1,11 @@
-"""The commands that take a scene or the files of a run; they import what they work with when they are called."""
+"""The commands on scenes and plugins; they import what they work with when they are called."""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import shlex
 import sys
-from contextlib import redirect_stdout
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +16,6 @@ from haploop.tools.command.given import kinds_with, notes_in_place, print_note, 
 from haploop.tools.command.options import (
     FAILED,
     WRONG_USE,
-    Directory,
     Json,
     Plugin,
     Set,
@@ -29,8 +29,91 @@ from haploop.tools.command.options import (
 if TYPE_CHECKING:
     from haploop.controller.dissipation import Element
 
+_YOURS = "your own file is used here: {0}"
 # More samples of a recorded force than this are not printed to a terminal.
 _MOST_PRINTED = 20
+
+
+def scenes(
+    name: Annotated[str | None, typer.Argument(help="print this one's file, to copy it", show_default=False)] = None,
+    json: Json = False,
+) -> None:
+    """List the available scenes, devices, hands and sweeps. A name means your own file first, then one of these."""
+    from haploop.launch.scene.bundled import FOLDERS, about, bundled, of_name, own_file
+    from haploop.protocol.names import meant
+
+    if name is not None:
+        path = next(filter(None, (of_name(name, folder) for folder in FOLDERS)), None)
+        if path is None:
+            hint = meant(name, [one for folder in FOLDERS for one in bundled(folder)])
+            leave(f"{name} does not come with haploop{hint}; haploop scenes lists what does.", WRONG_USE)
+        print(path.read_text(encoding="utf-8"), end="")
+        return
+    listed = {
+        folder: {
+            name: _YOURS.format(own) if (own := own_file(name, folder)) else about(path)
+            for name, path in bundled(folder).items()
+        }
+        for folder in FOLDERS
+    }
+    if json:
+        print_json(listed)
+        return
+    from haploop.tools.render.listings import bundled_table
+    from haploop.tools.render.terminal import console
+
+    console().print(bundled_table(listed))
+
+
+def new(
+    file: Annotated[Path, typer.Argument(help="scene file to write; it must not exist yet", show_default=False)],
+    device: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME", help="one that haploop scenes lists, or your own file", autocompletion=complete("devices")
+        ),
+    ] = "premium15",
+    hand: Annotated[
+        str, typer.Option(metavar="NAME", help="likewise", autocompletion=complete("hands"))
+    ] = "fu_cavusoglu_y",
+    wall: Annotated[
+        str | None,
+        typer.Option(
+            metavar="STIFFNESS", help="stiffness of the wall [that of the files, or 0.5 N/mm]", show_default=False
+        ),
+    ] = None,
+) -> None:
+    """Write a commented scene to start from. A hand moves a device into a wall and holds it there."""
+    from haploop.launch.scene.file import load
+    from haploop.launch.scene.first_scene import FirstSceneError, first_scene
+    from haploop.launch.scene.mistakes import SceneError
+
+    with plain_errors():
+        try:
+            text = first_scene(device, hand, wall, file.parent)
+        except FirstSceneError as error:
+            leave(str(error), WRONG_USE)
+        except OSError as error:
+            leave(f"{error.filename} cannot be read: {error.strerror}.", WRONG_USE)
+        is_new = False
+        try:
+            with file.open("x", encoding="utf-8") as new_file:
+                is_new = True
+                new_file.write(text)
+        except FileExistsError:
+            leave(f"{file} already exists; name a file that does not.", WRONG_USE)
+        except OSError as error:
+            if is_new:
+                with contextlib.suppress(OSError):  # a full disk leaves a broken file, which is removed
+                    file.unlink()
+            leave(f"{file} cannot be written: {error.strerror}.", FAILED)
+        try:
+            load(file)
+        except SceneError:
+            file.unlink()
+            raise
+    name = shlex.quote(str(file))
+    print(f"Next: haploop run {name}, haploop explain {name}, haploop advise {name}.")
 
 
 def check(
@@ -117,79 +200,3 @@ def _parameters(element: type[Element]) -> dict[str, dict[str, str | float | Non
         name: quantity.as_dict() | ({} if default is dataclasses.MISSING else {"default": default})
         for name, (quantity, default) in element.parameters().items()
     }
-
-
-def replay(directory: Directory, json: Json = False) -> None:
-    """Repeat a run from its log and say whether all bits agree."""
-    from haploop.launch.runs import replay as runs
-    from haploop.protocol.transport.prints import unheard
-
-    with plain_errors(), redirect_stdout(sys.stderr):
-        try:
-            with unheard():
-                result = runs.replay(directory)
-        except runs.ReplayError as error:
-            leave(str(error), WRONG_USE)
-    print_note(result.cut)
-    if json:
-        half = {"half": result.half, "other": result.other} if result.half else {}
-        print_json({"agrees": not result.differences, "differences": result.differences, **half, **result.summary})
-    elif result.differences:
-        print("\n".join([*result.differences, *filter(None, [result.half, result.other])]))
-    elif result.half:
-        print(f"Every bit of {result.summary['ticks']} ticks agreed. {result.half} {result.other}".rstrip())
-    else:
-        print(f"Every bit of {result.summary['steps']} steps agreed: {result.summary['trajectory_sha256']}")
-    if result.differences:
-        raise SystemExit(FAILED)
-
-
-def judge(directory: Directory, json: Json = False) -> None:
-    """Say whether the loop of a run is stable.
-
-    The run is repeated from its log. Then the hand is held still without noise, pushed hard and softly, and the loop
-    is watched for up to 64 s of simulated time: does it come to rest? The verdict is steady, limit-cycle, growing,
-    diverged, no-contact or undecided.
-    """
-    from haploop.launch.runs.replay import ReplayError, demand_own, logged_run, repeatable
-    from haploop.launch.stability.judge import entries_of, judge_scene
-    from haploop.logger.verdict.measures import WINDOW_S
-    from haploop.protocol.transport.prints import unheard
-    from haploop.tools.render.report import finding_table
-    from haploop.tools.render.terminal import console
-
-    with plain_errors(), redirect_stdout(sys.stderr):
-        try:
-            recorded = logged_run(directory)
-            print_note(recorded.cut)
-            with unheard():
-                scene, kinds, events = repeatable(directory, recorded)
-                demand_own(recorded, scene)
-                finding = judge_scene(scene, kinds, events, thorough=True, causes=True)
-                last_s = float(recorded["/controller"]["timestamp"][-1])
-                found = entries_of(finding, scene, last_s - min(WINDOW_S, last_s / 2.0))["stability"]
-        except ReplayError as error:
-            leave(str(error), WRONG_USE)
-    if json:
-        print_json(dataclasses.asdict(finding) | {"sentence": finding.sentence(), "provisos": found["provisos"]})
-    else:
-        console().print(finding_table(finding, found))
-
-
-def export(
-    directory: Annotated[Path, typer.Argument(help="directory of a run, or its log", show_default=False)],
-    to: Annotated[str, typer.Option(help="csv, npz, parquet or json-mcap (for Foxglove)", show_default=False)],
-    out: Annotated[
-        Path | None, typer.Option(help="directory (csv, parquet: one file per channel) or file [beside the log]")
-    ] = None,
-    topics: Annotated[str | None, typer.Option(help="only these channels, comma-separated [all]")] = None,
-    force: Annotated[bool, typer.Option("--force", help="overwrite existing files")] = False,
-) -> None:
-    """Write a run's log in a format for other programs. Names and units are kept; stdout names the files.
-
-    Memory use does not depend on the length of the log. A missing number, such as an element's before it was swapped
-    in, is NaN in npz and parquet, an empty cell in csv, and left out in json-mcap, as are numbers that are not finite.
-    """
-    from haploop.tools.export.command import export_run
-
-    export_run(directory, to, out, topics, force)

@@ -30,7 +30,7 @@ def demo(
     Plant, controller and logger run as three processes. The last line names the figure's file.
     """
     with LeavingAtOnce():
-        from haploop.launch import load
+        from haploop.launch.runs.loaded_scene import load
         from haploop.launch.runs.start import lay_out
         from haploop.launch.scene.bundled import bundled
         from haploop.launch.spec import RunFailed, make_output

@@ -1,1 +1,4 @@
-"""The figure of a run, and what all figures share."""
+"""The figure of a run, and what all figures share.
+
+``run_figure`` draws it.
+"""

@@ -1,1 +1,4 @@
-"""Linear theory of a loop in contact: the one-tick map, its limit of stability, and known bounds."""
+"""Linear theory of a loop in contact: the one-tick map, its limit of stability, and known bounds.
+
+``one_tick`` makes the map.
+"""

@@ -1,1 +1,4 @@
-"""Swings of a recorded motion: whether it buzzes, and what feeds it."""
+"""Swings of a recorded motion: whether it buzzes, and what feeds it.
+
+``finder`` looks for them.
+"""

@@ -1,1 +1,4 @@
-"""The map of a sweep: its data, its lines and its drawing."""
+"""The map of a sweep: its data, its lines and its drawing.
+
+``figure`` draws it from ``data``.
+"""
