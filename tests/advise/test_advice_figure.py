@@ -1,16 +1,19 @@
 """The figure of an advice: every mark has its number, nothing has a length, and both panels share an axis."""
 
+import math
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import pytest
 
+from haploop.tools.advise.families import BOTH, DAMPING, NOTHING
 from haploop.tools.advise.figure import figure_of
 from haploop.tools.advise.search import fallen
+from haploop.tools.advise.walls.limit import Limit
 from haploop.tools.advise.walls.store import Failure
-from haploop.tools.advise.withstand import Rival
-from helpers.data.advices import ADVICE, DAMPED, ONE, TWO, changed
+from haploop.tools.advise.withstand import Best, Rival
+from helpers.data.advices import ADVICE, DAMPED, FOUND, ONE, TWO, changed
 
 WIDE = "Common Mass of a Wrist Motor, " * 3
 LONG = replace(
@@ -40,6 +43,16 @@ def test_what_withstood_the_attack_stands_beside_what_holds_in_every_corner_and_
     assert [beside(changes, row)[1:] for row in range(3)] == [
         ["5.8 N/mm", "2.3 N/mm"], ["0.13 N/mm", "0.13 N/mm"], ["2.8 N/mm", "2.1 N/mm"],
     ]  # fmt: skip
+
+
+def test_the_widest_numbers_beside_the_axes_do_not_overlap():
+    """ "below 0.040 N/mm" ran into the dash of the column before it."""
+    below, wide = Limit(0.0, 40.2), Limit(20_123.4, math.inf)
+    bests = (Best(NOTHING, (), below, below), Best(DAMPING, (1.1,), wide, wide), Best(BOTH, (1.1, 2e-3), below))
+    figure = figure_of(replace(ADVICE, found=replace(FOUND, bests=bests, fell=((bests[0], 40.2),))))
+    figure.draw_without_rendering()
+    places = [text.get_window_extent() for text in figure.get_axes()[0].texts if text.get_text()]
+    assert not any(one.overlaps(other) for one, other in combinations(places, 2))
 
 
 @pytest.mark.parametrize("advice", [ADVICE, LONG], ids=["usual", "long words"])

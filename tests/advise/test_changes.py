@@ -168,6 +168,15 @@ def test_of_a_loop_that_bears_no_wall_only_what_makes_one_possible_is_told() -> 
     assert len([ax for ax in figure_of(replace(told, changed=(helps,))).axes if ax.get_title("left")]) == 2
 
 
+def test_where_no_wall_withstands_the_attack_a_multiple_says_of_which_wall_it_is() -> None:
+    """No wall was safe, and halving the count was said to gain 2.5 times, of nothing."""
+    lines = dict(answer(replace(ADVICE, found=replace(ADVICE.found, stiffness_N_m=0.0))))
+    of = "of 2.9 N/mm, a wall that withstands the hardest corners, but not the attack: "
+    assert lines["gains most"] == f"{of}ticks twice as often: 2.0 times (1.0 without an element)"
+    assert lines["loses most"].startswith(f"{of}no friction: ")
+    assert not dict(answer(ADVICE))["gains most"].startswith("of ")
+
+
 def test_a_scene_without_a_wall_is_advised_as_its_device_is(tmp_path) -> None:
     path = tmp_path / "no_wall.toml"
     path.write_text('extends = "devices/premium15"\nduration = "2 s"\n')

@@ -1,5 +1,7 @@
 """Answers of the page at once: verdict, state and numbers, with and without a run, with and without a server."""
 
+import re
+
 import pytest
 from playwright.sync_api import expect
 
@@ -224,6 +226,7 @@ def test_a_failed_run_says_why(stand_in, open_page):
     stand_in.state(phase="failed", why="The plant was killed by SIGKILL.", options=None)
     page = open_page(stand_in.url)
     expect(page.locator("#phase")).to_have_text("failed")
+    expect(page).to_have_title(re.compile("^failed: "))
     expect(page.locator("#notice")).to_contain_text("The plant was killed by SIGKILL.")
 
 

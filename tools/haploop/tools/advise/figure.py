@@ -29,7 +29,7 @@ _NAME_LETTERS = 60
 _DOT = 7.0
 _LIGHT, _HALF, _SOFTER = "white", "#9CC3E0", "#B07A45"
 # Right ends of the columns of numbers beside the axes, in points.
-_COLUMNS = 85, 155, 230
+_COLUMNS = 95, 192, 289
 # Numbers at which an axis may begin and end, in every decade.
 _ENDS = (1.0, 2.0, 5.0)
 # About where an axis lies on which there is nothing to mark.

@@ -35,6 +35,7 @@ _NONE_MAKES = "no single change that was tried makes a wall possible"
 _NO_CHANGE, _NO_LOSS = "no single change that was tried gains a fifth", "no single change that was tried costs a sixth"
 _TUNED, _TIMES, _TIMES_ALONE = ", with the element tuned again", "{0}: {1} times", " ({0} without an element)"
 _GAINS_ALONE = "the wall without an element gains from more changes: {0}"
+_IN_CORNERS = "of {0}, a wall that withstands the hardest corners, but not the attack: "
 _HAND = "of {0} kg, {1} N s/m and {2} N/m{3}, each 20 % more or less; another hand may make this wall buzz (--hand)"
 _GRIP = ", holding through a grip of {0} N s/m and {1} N/m"
 _NO_HAND = "none, only its force: a hand may make this wall buzz (--hand)"
@@ -106,7 +107,8 @@ def answer(told: Advice) -> list[tuple[str, str]]:
     if not told.unchanged.limit.stiffness_N_m:
         return [*lines, ("gains most", _from_none(told)), *_known(told)]
     gains = [_times(told, row) for row in told.changed if row.factor >= _TELLS]
-    lines.append(("gains most", "; ".join(gains[:3]) or _NO_CHANGE + _TUNED * bool(best.values)))
+    of = "" if found.stiffness_N_m else _IN_CORNERS.format(format_limit(told.unchanged.limit))
+    lines.append(("gains most", of + ("; ".join(gains[:3]) or _NO_CHANGE + _TUNED * bool(best.values))))
     of_alone = [row for row in told.changed if row.alone_factor >= _TELLS > row.factor]
     if best.values and of_alone:
         of_alone.sort(key=lambda row: -row.alone_factor)
@@ -114,7 +116,7 @@ def answer(told: Advice) -> list[tuple[str, str]]:
         lines.append(("without one", _GAINS_ALONE.format("; ".join(some))))
     worst = sorted((*told.changed, *told.without), key=lambda row: row.factor)
     loses = [_times(told, row) for row in worst if row.factor * _TELLS <= 1.0]
-    return [*lines, ("loses most", "; ".join(loses[:3]) or _NO_LOSS), *_known(told)]
+    return [*lines, ("loses most", of + ("; ".join(loses[:3]) or _NO_LOSS)), *_known(told)]
 
 
 def _from_none(told: Advice) -> str:

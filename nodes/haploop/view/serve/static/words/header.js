@@ -30,7 +30,7 @@ export function showHeader(state, phase) {
   sign(sought, `phase-${phase}`, WORDS[phase] ?? phase);
   put(byId("title"), state.title || "haploop");
   byId("title").title = state.title || "";
-  put(document.querySelector("title"), state.title ? `${told(state) || phase}: ${state.title}` : "haploop");
+  put(document.querySelector("title"), state.title ? `${phase === "failed" ? phase : told(state) || phase}: ${state.title}` : "haploop");
   showVerdict(state);
   const { sight } = state;
   put(byId("oscillation"), amount(sight?.oscillation_m, "m"));
