@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -214,3 +215,23 @@ def test_a_sweep_over_an_array_has_a_row_for_every_value_each_as_its_own_run() -
         table["wall.stifness"]
     with pytest.raises(TypeError, match="swept over axes"):
         sweep(scene)
+
+
+@pytest.mark.parametrize(
+    ("text", "columns", "says"),
+    [
+        ("a,x\n0,0\n1,1\n", {}, "Name it with time or rate_Hz."),
+        ("t,x\n0,0\n1,5\n", {"time_unit": "s"}, "Give length m, mm or metres per count"),
+        ("t,x\n0,0\n0.001,1\n", {"time": "t", "rate_Hz": 100.0}, "not both"),
+    ],
+)
+def test_a_mistake_in_a_recording_names_the_argument_not_the_option_of_the_command(tmp_path, text, columns, says):
+    (tmp_path / "r.csv").write_text(text)
+    with pytest.raises(ValueError, match=re.escape(says)) as wrong:
+        dissipate(tmp_path / "r.csv", damping=1.0, **columns)
+    assert "--" not in str(wrong.value)
+
+
+def test_an_unknown_column_of_a_recording_is_answered_with_the_nearest():
+    with pytest.raises(TypeError, match=r"takes no rate \(did you mean rate_Hz\?\); of a text file, position"):
+        dissipate("r.csv", damping=1.0, rate=100.0)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +14,7 @@ from haploop.controller.dissipation import registry
 from haploop.launch.runs.loaded_scene import LoadedScene, Values, load, mistakes_of_python, plain, texts
 from haploop.launch.runs.result import Result
 from haploop.launch.scene.toml_writer import to_toml
+from haploop.protocol.names import meant
 
 if TYPE_CHECKING:
     from haploop.api.results import AdviceResult, ComparisonResult
@@ -23,6 +26,9 @@ Plugins = Iterable[str | Path]
 # Numbers of an element, each an SI number or text with its unit; a single one needs no list.
 Amount = float | str
 Amounts = Amount | Iterable[Amount]
+# An option of a command in the text of an error, and the arguments that have another name than their option.
+_OPTION = re.compile(r"(?<![\w-])--([a-z]+(?:-[a-z]+)*)")
+_ARGUMENTS = {"rate": "rate_Hz", "unit": "length", "element": "elements", "set": "values"}
 
 
 def sweep(
@@ -176,16 +182,30 @@ def dissipate(
 
     Raises:
         RecordingError, FileNotFoundError, LogError, SceneError, ElementError: the recording or selection is wrong.
+        TypeError: there is no such argument.
     """
+    from haploop.launch.scene.reading.delimited import RecordingError
     from haploop.tools.dissipate.command import Request, Selection, compute_outcome
     from haploop.tools.dissipate.recording.text_recording import Layout
 
     dampings, masses = _texts(damping), _texts(mass)
     place = None if wall is None else str(plain(wall))
     selection = Selection(dampings, masses, list(elements), place, occupies, texts(values))
+    known = [field.name for field in fields(Layout)]
+    for name in columns:
+        if name not in known:
+            raise TypeError(f"dissipate() takes no {name}{meant(name, known)}; of a text file, {', '.join(known)}.")
     request = Request(Path(recording), selection, Layout(**columns), delay_s)
-    with mistakes_of_python():
-        return compute_outcome(request, registry([Path(plugin) for plugin in plugins]))
+    try:
+        with mistakes_of_python():
+            return compute_outcome(request, registry([Path(plugin) for plugin in plugins]))
+    except RecordingError as error:
+        raise RecordingError(_OPTION.sub(_argument, str(error))) from None
+
+
+def _argument(option: re.Match[str]) -> str:
+    """Returns the argument of ``dissipate`` that stands for an option of the command."""
+    return _ARGUMENTS.get(option[1], option[1].replace("-", "_"))
 
 
 def _texts(amounts: Amounts) -> list[str]:
