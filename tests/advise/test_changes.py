@@ -110,8 +110,9 @@ def told_with(row: Changed, values: Values = (5.0,)) -> dict[str, str]:
 
 
 def changed(factor: float, alone_factor: float) -> Changed:
-    base = Borne(*[Limit(1000.0, 1001.0)] * 2)
-    some = Borne(*[Limit(1e3 * times, 1e3 * times + 1.0) for times in (factor, alone_factor)])
+    base = Borne(Limit(1000.0, 1001.0), Limit(1000.0, 1001.0))
+    limit, alone = (Limit(1e3 * times, 1e3 * times + 1.0) for times in (factor, alone_factor))
+    some = Borne(limit, alone)
     return Changed.from_borne("delay halved", some, base)
 
 

@@ -23,6 +23,7 @@ from haploop.protocol.transport.observer import Observer
 from haploop.protocol.transport.wire import encode
 from haploop.view.receive.run_session import RunSession
 from helpers.live.attacks import false_joins, junk, out_of_place
+from helpers.live.browsing import NoRuns
 from simulation.computer.world import Process
 from simulation.faults import Fault
 
@@ -134,7 +135,7 @@ class Listener(Visit):
 
     def _follow(self, sim: Sim, process: Process, live: Live, leave: Callable[[], bool]) -> None:
         if self.is_viewer:
-            session = RunSession(_Nobody(), live)
+            session = RunSession(NoRuns(), live)
             while not session.outcome and not leave():
                 session.poll()
                 process.sleep(self.every_s)
@@ -153,25 +154,6 @@ class Listener(Visit):
             observer.leave()
         finally:
             context.destroy(linger=200)
-
-
-class _Nobody:
-    """Finds no runs, and has none to steer."""
-
-    def live(self) -> list[Any]:
-        return []
-
-    def stiffness_limit(self, scene: Any) -> float | None:
-        return None
-
-    def past(self) -> list[Any]:
-        return []
-
-    def has_launcher(self, run: Any) -> bool:
-        return False
-
-    def ask(self, run: Any, verb: str, arguments: Any) -> tuple[str, Any]:
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)
