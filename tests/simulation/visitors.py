@@ -135,7 +135,7 @@ class Listener(Visit):
 
     def _follow(self, sim: Sim, process: Process, live: Live, leave: Callable[[], bool]) -> None:
         if self.is_viewer:
-            session = RunSession(NoRuns(), live)
+            session = RunSession(_Only(live), live)
             while not session.outcome and not leave():
                 session.poll()
                 process.sleep(self.every_s)
@@ -154,6 +154,17 @@ class Listener(Visit):
             observer.leave()
         finally:
             context.destroy(linger=200)
+
+
+class _Only(NoRuns):
+    """One live run, and nobody who steers it."""
+
+    def __init__(self, run: LiveRun) -> None:
+        super().__init__()
+        self._run = run
+
+    def live(self) -> list[Any]:
+        return [self._run]
 
 
 @dataclass(frozen=True)
