@@ -233,7 +233,7 @@ class Viewer:
             is_last = not self._runs.has_launcher(run)
             if record := self._runs.record_of(run):
                 try:
-                    session: RunSession = await asyncio.to_thread(PastSession, record)
+                    session = await asyncio.to_thread(PastSession, record)
                 except (OSError, LogError, ValueError):
                     return None
                 session.run, session.given_up = run, False

@@ -9,7 +9,7 @@ from haploop.protocol.changes import changes_of, spans
 from haploop.protocol.ticks import Timebase
 from haploop.view.receive.ingest import Backfill
 from haploop.view.receive.run_session import RunSession
-from haploop.view.receive.runs import PastRun
+from haploop.view.receive.runs import PastRun, Run
 from haploop.view.store.history import History
 
 
@@ -21,7 +21,7 @@ class PastSession(RunSession):
     """
 
     def __init__(self, run: PastRun) -> None:
-        self.run = run
+        self.run: Run = run
         scene = run.scene()
         time = Timebase.from_scene(scene)
         self._begin(scene, time, run.out, History(time, 0))
