@@ -14,7 +14,7 @@ from haploop.protocol.scene.effects import Friction
 from helpers.runs.judged import ended, found
 from helpers.scenes import wild_loops
 from helpers.scenes.least import scene
-from helpers.scenes.pressed import PLAIN, pressed
+from helpers.scenes.pressed import PLAIN, THROWN, pressed
 from helpers.scenes.unseen_loops import drawn
 
 
@@ -94,6 +94,16 @@ def test_a_wall_that_friction_holds_until_it_is_tapped_is_not_called_steady(held
         {"kind": "constant", "value": held_N}, tap))  # fmt: skip
     assert word(**at_rest) == "undecided"
     assert word(**tapped) == "limit-cycle"
+
+
+def test_a_loop_whose_run_swings_on_while_pushes_and_blows_end_the_swing_is_undecided():
+    """Coarse counts, friction and a device thrown at the wall: 176 um at 70 Hz for as long as nobody touches it."""
+    finding = found(scene(**THROWN))
+    assert (finding.word, finding.blown, finding.left) == ("undecided", "rests", "swings on")
+    assert finding.left_m == pytest.approx(176e-6, rel=0.02)
+    assert "Not pushed, from where its run ended, it swings on, by 17" in finding.sentence()
+    slower = found(scene(**{**THROWN, "device": {**THROWN["device"], "velocity": -0.2}}))
+    assert (slower.word, slower.left) == ("steady", None), "a run that has come to rest is not watched once more"
 
 
 def test_a_device_that_nobody_holds_at_the_wall_is_undecided():

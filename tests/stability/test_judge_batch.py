@@ -19,7 +19,9 @@ from haploop.protocol.scene.effects import Friction, Noise
 from haploop.protocol.scene.hand_force import Sine
 from haploop.protocol.scene.paths import with_value
 from haploop.protocol.scene.scene import Hand, Scene, by_window
+from helpers.scenes.least import scene
 from helpers.scenes.observed import observed
+from helpers.scenes.pressed import THROWN
 
 
 def shipped(name: str, stiffnesses: Sequence[float], **tables) -> list[Scene]:
@@ -71,6 +73,12 @@ def limited() -> list[Scene]:
     return [with_value(base, "actuator.saturation", most_N) for most_N in (0.3, 2.0, 6.9)]
 
 
+def thrown() -> list[Scene]:
+    """Devices thrown at a wall behind coarse counts: the run of one swings on, though a push would end that."""
+    base = scene(**THROWN, run={"verdict": "pushed"})
+    return [with_value(base, "device.velocity", v) for v in (-0.3, -0.2, 0.0)]
+
+
 FAMILIES: dict[str, Callable[[], list[Scene]]] = {
     "plain": lambda: shipped("fig6a", [20.0, 200.0, 3000.0]),
     "inertia": lambda: shipped("fig6c", [20.0, 60.0, 150.0]),
@@ -80,6 +88,7 @@ FAMILIES: dict[str, Callable[[], list[Scene]]] = {
     "counts": within_counts,
     "devices that rub": devices,
     "limited": limited,
+    "thrown": thrown,
     "friction or none": friction_or_none,
     "observing": lambda: [observed(k, run={"verdict": "pushed"}) for k in (300.0, 2000.0)],
 }
@@ -103,8 +112,9 @@ def test_a_loop_judged_among_others_has_the_words_and_bits_it_has_alone(family):
     assert any(result["stability"].get("at_hardest") for result in alone) == (family == "swaying")
     assert any(result["stability"].get("deeper") == "swings on" for result in alone) == (family == "counts")
     assert any(result["stability"].get("frictionless") for result in alone) == (
-        family in ("friction", "friction or none", "devices that rub")
+        family in ("friction", "friction or none", "devices that rub", "thrown")
     )
+    assert any(result["stability"].get("left") == "swings on" for result in alone) == (family == "thrown")
 
 
 def test_where_all_loops_that_remember_are_told_at_once_nothing_goes_on():

@@ -15,16 +15,21 @@ from haploop.launch.stability.why import (
     DEEPER,
     FRICTIONLESS,
     GROWS,
+    GROWS_ON,
     JUDGE,
     JUDGED_S,
     LASTS,
+    LEFT_ALONE,
+    SWINGS_ON,
     WHY,
 )  # fmt: skip
 from haploop.logger.verdict.measures import WINDOW_S
+from haploop.protocol.amounts import amount
 from haploop.protocol.filled import filled
 
-# Swings of the loop and of its run whose widths differ by more than this factor are not the same.
-_WIDER = 1.2
+# Swings of the loop and of its run whose widths differ by more than this factor are not the same; chaotic ones vary
+# from one window to the next by more than their pieces show.
+_WIDER, _WIDER_CHAOTIC = 1.2, 1.5
 # Nobody is asked for a run longer than this.
 _LONGEST_S = 3600.0
 # A command whose ripple exceeds this share of the push (a tenth of the hold), or this force, is reported beside the
@@ -34,8 +39,8 @@ HAND_MOVES, NOISE = "the hand's motion", "noise"
 UNFELT, OTHER_WIDTH = "less than a hand feels", "of another width than in its run"
 # This near to the least that a hand feels, a run of another length may give the other verdict.
 EDGE, _EDGE = "at the edge of what a hand feels", (0.8, 1.25)
-# A width below this is given in micrometres; a swing that changes by less than this, in 1/s, has reached its end.
-_FINE_UM, STILL_1_S = 10.0, 0.05
+# A swing that changes by less than this, in 1/s, has reached its end.
+STILL_1_S = 0.05
 
 # What ``Finding.entries`` reports about the run beside the finding.
 BESIDE = {
@@ -77,6 +82,9 @@ class Finding:
             change most; None if it was not watched to an answer.
         blow_N: for a loop that rests after the push, a harder push, into the wall and off it; None if not asked.
         blown: what it does after these: rests, rests off the wall, swings on, or undecided; None if not asked.
+        left: for a loop that rests after these, while its run still moved at its end, what it does left alone there:
+            rests, rests off the wall, swings on, or undecided; None if not asked, or if it did not move.
+        left_m: how wide the swing that lasts there is, peak to peak; None if none does, or if it grows.
         frictionless: what a loop that also rests after these would do after the push without its friction: rests,
             swings on, swings on a part of a count deeper, or undecided; None if not asked, or if it has no friction.
         frictionless_m: how wide the swing that lasts then is, peak to peak; None if none does, or if it grows.
@@ -113,6 +121,8 @@ class Finding:
     most_1_s: float | None = None
     blow_N: float | None = None
     blown: str | None = None
+    left: str | None = None
+    left_m: float | None = None
     frictionless: str | None = None
     frictionless_m: float | None = None
     hardest_N: float | None = None
@@ -133,15 +143,23 @@ class Finding:
 
     def after_blow(self, found: Finding) -> Finding:
         """Returns the finding with what was found after a harder push: undecided unless it rests then, too."""
-        blown = found.why if found.why == "rests off the wall" else DOES.get(found.word, "undecided")
-        struck = replace(self, blow_N=found.push_N, blown=blown, **self._at_either(found))
-        return struck if blown.startswith("rests") else replace(struck, word="undecided", why="rested")
+        blown = _does(found)
+        return replace(self, blow_N=found.push_N, blown=blown)._if_rests(blown, found)
+
+    def left_alone(self, found: Finding) -> Finding:
+        """Returns the finding with what was found without a push: undecided unless it rests then, too."""
+        left = _does(found)
+        return replace(self, left=left, left_m=_lasting_m(found))._if_rests(left, found)
+
+    def _if_rests(self, does: str, found: Finding) -> Finding:
+        told = replace(self, **self._at_either(found))
+        return told if does.startswith("rests") else replace(told, word="undecided")
 
     def held_harder(self, hold_N: float, found: Finding) -> Finding:
         """Returns the finding with what was found at a harder hold: undecided unless it rests there, too."""
         does = DOES.get(found.word, "undecided")
         told = replace(self, hardest_N=abs(hold_N), at_hardest=does, **self._at_either(found))
-        return told if does == "rests" else replace(told, word="undecided", why="rested")
+        return told if does == "rests" else replace(told, word="undecided")
 
     @property
     def rests_freely(self) -> bool:
@@ -158,7 +176,7 @@ class Finding:
             does = f"{does} a part of a count deeper" if does == "swings on" else does
             return replace(self, frictionless=does, frictionless_m=_lasting_m(found))
         told = replace(self, deeper_N=abs(more_N), deeper=does, **self._at_either(found))
-        return told if does == "rests" else replace(told, word="undecided", why="rested")
+        return told if does == "rests" else replace(told, word="undecided")
 
     def _at_either(self, found: Finding) -> dict[str, bool]:
         """Returns what is told of a loop that rests if it holds here or where it was tried next."""
@@ -212,10 +230,11 @@ class Finding:
 
     def _is_other(self, seen_m: float | None) -> bool:
         """Tells whether the run's swing is wider or narrower than that after the push, by more than both vary."""
-        if not seen_m or self.chaotic or self.frequency_Hz * WINDOW_S < 1.0:
+        if seen_m is None or self.frequency_Hz * WINDOW_S < 1.0:
             return False
         most_m, least_m = self.width_m + 2.0 * self.spread_m, self.width_m - 2.0 * self.spread_m
-        return not least_m / _WIDER <= seen_m <= most_m * _WIDER
+        wider = _WIDER_CHAOTIC if self.chaotic else _WIDER
+        return not least_m / wider <= seen_m <= most_m * wider
 
     def own_share(self, seen_m: float | None) -> float | None:
         """Returns the share of the swing seen in the run that the loop sustains alone, with a still hand and no noise.
@@ -236,22 +255,25 @@ class Finding:
     def sentence(self) -> str:
         """Returns the reason for the verdict, a sentence with its numbers."""
         numbers = {name: math.nan if value is None else value for name, value in vars(self).items()}
-        width_um, width = 1e6 * self.width_m, _in_words(self.width_m)
+        width_um, width = 1e6 * self.width_m, amount(self.width_m, "m")
         about_s = float(f"{numbers['needs_s']:.2g}")
         longer = f"watching for about {about_s:.0f} s" if about_s <= _LONGEST_S else "a much longer run"
         run = JUDGE if self.watched_s < JUDGED_S else longer
         sentence = filled(WHY[self.why], **numbers, width=width, width_um=width_um, run=run, decaying=self._decaying())
         sentence += filled(AFTER_BLOW[self.blown], **numbers) if self.blown else ""
+        on = SWINGS_ON.format(amount(self.left_m, "m")) if self.left_m else GROWS_ON
+        sentence += LEFT_ALONE[self.left].format(on) if self.left else ""
         sentence += filled(AT_HARDEST[self.at_hardest], **numbers) if self.at_hardest else ""
         sentence += filled(DEEPER[self.deeper], **numbers) if self.deeper else ""
-        lasts = LASTS.format(_in_words(self.frictionless_m)) if self.frictionless_m else GROWS
+        lasts = LASTS.format(amount(self.frictionless_m, "m")) if self.frictionless_m else GROWS
         return sentence + (FRICTIONLESS[self.frictionless].format(lasts) if self.frictionless else "")
+
+
+def _does(found: Finding) -> str:
+    """Returns what a loop does: rests, rests off the wall, swings on, or undecided."""
+    return found.why if found.why == "rests off the wall" else DOES.get(found.word, "undecided")
 
 
 def _lasting_m(found: Finding) -> float | None:
     """Returns the width of a swing that lasts, m; None for any other."""
     return found.width_m if found.word == "limit-cycle" else None
-
-
-def _in_words(width_m: float) -> str:
-    return f"{1e3 * width_m:.3g} mm" if 1e6 * width_m >= _FINE_UM else f"{1e6 * width_m:.3g} µm"

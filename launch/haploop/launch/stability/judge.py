@@ -28,7 +28,7 @@ from haploop.launch.stability.looks import (
     push_of,
 )
 from haploop.launch.stability.still_hand import End, StillHand, deeper_holds, harder_hold, hold_of
-from haploop.launch.stability.watch import watch
+from haploop.launch.stability.watch import moves_on, watch
 from haploop.logger.summary import Summary, finite, write_summary
 from haploop.logger.verdict.measures import window_span
 from haploop.logger.verdict.window import keep_steps
@@ -185,7 +185,8 @@ def judge(
     The hand is held still with the mean force of its last contacts, noise is switched off, and two copies of the loop
     are pushed, one ten times as hard as the other. Any motion a second later is the loop's own. Most loops show their
     verdict within a second or two; slow ones are watched to the last look. This takes as long as simulating that time
-    twice. A loop that comes to rest is also struck, into the wall and off it, which takes as long again. Friction stops
+    twice. A loop that comes to rest is also struck, into the wall and off it, which takes as long again, and left alone
+    if it still moved: a swing that a push ends may go on without one. Friction stops
     small swings of an unstable loop, but not wide ones: if ``thorough``, a loop that rests is also pushed without its
     friction, and one that rests without friction also where it lies a third and two thirds of an encoder's count
     deeper. A loop that rests at the last hold of a moving hand is also judged at that hand's hardest hold.
@@ -202,6 +203,8 @@ def judge(
     for blow in blows:
         if is_struck(found):
             found = found.after_blow(watch(end, (push_N * blow,), looks_s)[0])
+    if is_struck(found) and moves_on(end):
+        found = found.left_alone(watch(end, (0.0,), looks_s)[0])
     harder_N = None
     if found.word == "steady":
         harder_N = harder_hold(end.scene, end.time, end.plant.reached, end.hold_N, end.wall_m)

@@ -27,6 +27,7 @@ from haploop.launch.stability.memory_drift import may_act
 from haploop.launch.stability.still_batch import StillBatch
 from haploop.launch.stability.still_hand import deeper_holds, harder_hold, hold_of
 from haploop.launch.stability.swing import REST_M
+from haploop.launch.stability.watch import GLANCE_S
 from haploop.protocol.scene.effects import Friction
 from haploop.protocol.trees import tree_member, tree_take
 from haploop.protocol.walls.wall import Wall
@@ -61,6 +62,14 @@ def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s:
             blows, _ = _watched(end, members[struck], hold_N[struck], push_N[struck] * blow, (1.0,), looks_s)
             for place, of_blow in zip(struck, blows, strict=True):
                 found[place] = found[place].after_blow(of_blow)
+    if struck := [place for place, each in enumerate(found) if is_struck(each)]:
+        moving = [
+            place for place, moves in zip(struck, _move_on(end, members[struck], hold_N[struck]), strict=True) if moves
+        ]
+        if moving:
+            alone, _ = _watched(end, members[moving], hold_N[moving], np.zeros(len(moving)), (1.0,), looks_s)
+            for place, there in zip(moving, alone, strict=True):
+                found[place] = found[place].left_alone(there)
     rests = [place for place, each in enumerate(found) if each.word == "steady"]
     hardest = {place: _harder(end, members[place], float(hold_N[place])) for place in rests}
     harder_N = {place: hold for place, hold in hardest.items() if hold is not None}
@@ -69,6 +78,15 @@ def _judge_some(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray, looks_s:
         for (place, harder), there in zip(harder_N.items(), at_hardest, strict=True):
             found[place] = found[place].held_harder(harder, there)
     return _with_chaos(end, members, hold_N, push_N, found, asked)
+
+
+def _move_on(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray) -> list[bool]:
+    """Tells which members move on, left alone from the end of their runs."""
+    copies = StillBatch(end, members, hold_N, np.zeros(len(members)))
+    copies.go_to(GLANCE_S)
+    moves = np.ones(len(members), bool)
+    moves[copies.copy] = np.ptp(copies.positions(), axis=1) >= REST_M
+    return moves.tolist()
 
 
 def _pushes(end: BatchEnd, members: np.ndarray, hold_N: np.ndarray) -> np.ndarray:

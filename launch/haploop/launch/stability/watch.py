@@ -14,6 +14,19 @@ from haploop.launch.stability.memory_drift import may_act
 from haploop.launch.stability.still_hand import End, StillHand
 from haploop.launch.stability.swing import REST_M
 
+# Whether a loop moves that is left alone is looked at for this long.
+GLANCE_S = 0.25
+
+
+def moves_on(end: End) -> bool:
+    """Tells whether a loop moves on, left alone from the end of its run."""
+    copy = StillHand(end, 0.0)
+    try:
+        copy.go_to(GLANCE_S)
+    except (ArithmeticError, ElementError):
+        return True
+    return bool(copy.stop_reason) or float(np.ptp(copy.x)) >= REST_M
+
 
 def watch(end: End, pushes_N: tuple[float, ...], looks_s: Sequence[float]) -> tuple[Finding, np.ndarray]:
     """Watches a copy of the loop for each push until the copies tell what becomes of its swing.

@@ -15,11 +15,11 @@ WHY = {
     "{frequency_Hz:.3g} Hz lasted for {watched_s:g} s; the one that may change more grows or decays by no more than "
     "{most_1_s:.2g} 1/s (two standard errors).",
     "decays": "Its swing of {width} peak to peak at {frequency_Hz:.3g} Hz still decays, changing by {rate_1_s:.3g} +- "
-    "{error_1_s:.2g} 1/s, and nothing in the loop makes small swings differ from large ones.",
-    "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz.",
+    "{error_1_s:.2g} 1/s, and no limit, filter or rounding but the encoder's treats small swings otherwise.",
+    "grows": "Its swing grew by {rate_1_s:.3g} +- {error_1_s:.2g} 1/s, at {frequency_Hz:.3g} Hz, as long as it was "
+    "watched, {watched_s:g} s; what limits it later, if anything, is not known.",
     "leaves the limit": "Held still and pushed, the device went beyond its limit.",
     "failed": "The loop failed as its run was repeated, or while it was watched after it: {detail}",
-    "rested": "After a push of {push_N:.3g} N it came to rest.",
     "leaves the wall": "Held still, the hand does not keep the device at the wall.",
     "rests off the wall": "After a push of {push_N:.3g} N it came to rest off the wall.",
     "larger rests": "After a push of {push_N:.3g} N it came to rest, but after one of a tenth of that it swings on, by "
@@ -43,6 +43,13 @@ AFTER_BLOW = {
     "swings on": " After a harder blow, of {blow_N:.3g} N, it swings on: either may happen, depending on how it is "
     "touched.",
     "undecided": " Whether it also does so after a harder blow, of {blow_N:.3g} N, could not be determined.",
+}
+SWINGS_ON, GROWS_ON = "it swings on, by {} peak to peak", "its swing grows"
+LEFT_ALONE = {
+    "rests": "",
+    "rests off the wall": "",
+    "swings on": " Not pushed, from where its run ended, {}: either may happen, depending on how it is touched.",
+    "undecided": " Whether it also does so if it is not pushed, from where its run ended, could not be determined.",
 }
 AT_HARDEST = {
     "rests": " It also does so at the hand's hardest hold, {hardest_N:.3g} N.",

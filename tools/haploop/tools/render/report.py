@@ -243,26 +243,30 @@ def finding_table(finding: Finding, found: Summary) -> RenderableType:
     return Group(*parts)
 
 
+_GROWTH = "of the steadier swing {:.3g} +- {:.2g} 1/s, watched for {:g} s"
+
+
 def _stability(found: Summary) -> list[tuple[str, str]]:
     """Returns what a loop does, held still and pushed at its end; empty if it was not watched to an answer."""
     if found.get("rate_1_s") is None:
         return []
     rows = [("held still and pushed, it swings", swing_words(found))]
     if not rests(found):
-        watched = f"watched for {found['watched_s']:g} s"
-        rows += [
-            ("its commanded ripple", f"{amount(found['force_ripple_N'], 'N')} peak to peak above about 30 Hz"),
-            ("growth", f"of the steadier swing {found['rate_1_s']:.3g} +- {found['error_1_s']:.2g} 1/s, {watched}"),
-        ]
+        rows.append(("its commanded ripple", f"{amount(found['force_ripple_N'], 'N')} peak to peak above about 30 Hz"))
+    settles_s = found.get("settles_s")
+    if not rests(found) and settles_s is None:
+        rows.append(("growth", _GROWTH.format(found["rate_1_s"], found["error_1_s"], found["watched_s"])))
     if (share := found.get("own_share")) is not None:
         beside = found.get("moved_beside", ("the hand's motion", "noise"))
         own = f"{100 * share:.0f} %" if share >= 0.01 else "less than 1 %"
         rest = f"; the rest is {', '.join([*beside, _REST])}" if share < 0.995 else ""
         rows.append(("of the oscillation", f"{own} is the loop's own{rest}"))
-    if (settles_s := found.get("settles_s")) is not None:
+    if settles_s is not None:
         rows.append(("settles within", f"{amount(settles_s, 's')}, to 5 %"))
     if blown := found.get("blown"):
         rows.append(("after a blow", f"of {amount(found['blow_N'], 'N')}: {blown}"))
+    if left := found.get("left"):
+        rows.append(("not pushed", f"where its run ended: {left}"))
     if deeper := found.get("deeper"):
         rows.append(("held a little harder", f"by {amount(found['deeper_N'], 'N')}: {deeper}"))
     if frictionless := found.get("frictionless"):
