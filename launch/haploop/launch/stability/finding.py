@@ -147,9 +147,14 @@ class Finding:
         return replace(self, blow_N=found.push_N, blown=blown)._if_rests(blown, found)
 
     def left_alone(self, found: Finding) -> Finding:
-        """Returns the finding with what was found without a push: undecided unless it rests then, too."""
-        left = _does(found)
-        return replace(self, left=left, left_m=_lasting_m(found))._if_rests(left, found)
+        """Returns the finding with what was found without a push: undecided unless it rests then, too.
+
+        A swing no wider than the one that the push left, which no hand feels, is that swing.
+        """
+        left, left_m = _does(found), _lasting_m(found)
+        if left_m is not None and left_m <= _WIDER * self.width_m:
+            left, left_m = "rests", None
+        return replace(self, left=left, left_m=left_m)._if_rests(left, found)
 
     def _if_rests(self, does: str, found: Finding) -> Finding:
         told = replace(self, **self._at_either(found))
