@@ -336,3 +336,20 @@ def test_a_chart_made_in_another_layout_than_it_is_shown_in_ends_where_its_card_
     assert len({tuple(over) for _, over in found}) == 1, "one time axis"
     for card, over in [*found, *page.evaluate(ENDS, ".beside .u-over")]:
         assert card[1] - 40 < over[1] < card[1]
+
+
+@pytest.mark.parametrize("width", [900, 1280])
+def test_a_long_message_is_seen_whole_on_a_desk(stand_in, open_page, width):
+    """The line of the plugin that failed was cut off, the last words of the longest messages."""
+    stand_in.tell(RUNS | {"missed": 'Run a42e28, "a loop", ended before its first tick; its terminal says why.'})
+    stand_in.state(
+        phase="failed", options=None,
+        why="The controller failed: Element 0 (my-pc) gave no force at tick 2995: RuntimeError: my own fault at tick "
+        "1500 (mypc.py, line 24).",
+    )  # fmt: skip
+    page = open_page(stand_in.url, viewport={"width": width, "height": 800})
+    expect(page.locator("#notice")).to_contain_text("line 24")
+    box = page.locator(".messages").bounding_box()
+    notice = page.locator("#notice").bounding_box()
+    assert box["y"] <= notice["y"]
+    assert notice["y"] + notice["height"] <= box["y"] + box["height"] + 1

@@ -208,6 +208,17 @@ def test_a_new_scene_of_every_device_and_hand_can_be_run_and_asks_for_the_wall_i
     assert scene.wall
     assert scene.hand
     assert (scene.wall.stiffness, scene.hand.force) == (250.0, Ramp(value=-1.0, rise_time=0.3))
+    assert scene.hand.stiffness * -scene.wall.position < 1.0, "a stiff hand kept the device off a wall 5 mm away"
+
+
+def test_a_hand_of_any_stiffness_reaches_the_wall_of_its_new_scene():
+    given = ((10.0, -0.005), (100.0, -0.005), (500.0, -0.001), ("2 N/mm", -0.00025))
+    for number, (stiffness, place_m) in enumerate(given):
+        Path("hand.toml").write_text(f"[hand]\nmass = 0.1\nstiffness = {stiffness!r}\n")
+        assert call("new", f"{number}.toml", "--device", "touch", "--hand", "hand.toml").exit_code == 0
+        wall = load(f"{number}.toml").wall
+        assert wall
+        assert wall.position == pytest.approx(place_m)
 
 
 def test_a_new_scene_takes_a_device_and_a_hand_of_ones_own_wherever_they_are():

@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from haploop.launch.runs.replay import logged_run, repeatable
+from haploop.launch.stability.finding import OTHER_WIDTH
 from haploop.launch.stability.judge import judge_scene
 from haploop.tools.cli.app import app
 
@@ -53,8 +54,29 @@ def test_the_terminal_says_the_word_first_and_then_why(run):
 def test_a_moving_hand_is_told_beside_the_word_as_it_is_in_the_runs_own_summary(run):
     directory = run("launch/scenes/premium_tap.toml")
     provisos = json.loads(haploop("judge", str(directory), "--json").stdout)["provisos"]
-    assert provisos == ["only friction holds it", "tried at only some holds of its hand"]
-    assert set(provisos) <= set(json.loads((directory / "summary.json").read_text())["stability"]["provisos"])
+    assert provisos == ["only friction holds it", "tried at only some holds of its hand", "its force ripples"]
+    assert provisos == json.loads((directory / "summary.json").read_text())["stability"]["provisos"]
+
+
+TWO_SWINGS = """
+duration = 3
+device = { mass = 0.06308, damping = 0.1, velocity = -0.3, position = 0.0005 }
+friction.kinetic = 0.02
+encoder.resolution = 2e-5
+hand = { mass = 0.0915, stiffness = 90, damping = 6, force = { kind = "constant", value = -1.59 } }
+wall = { position = 0, stiffness = 20925 }
+dissipation = [{ kind = "damping", damping = 4.56 }]
+"""
+
+
+def test_what_is_told_of_the_runs_own_motion_is_told_by_judge_too_and_without_a_summary_left_out(run, tmp_path):
+    """The run swings by 6.1 um, the pushed loop by 23 um."""
+    (tmp_path / "two.toml").write_text(TWO_SWINGS)
+    directory = run(str(tmp_path / "two.toml"))
+    assert json.loads(haploop("judge", str(directory), "--json").stdout)["provisos"] == [OTHER_WIDTH]
+    (directory / "summary.json").write_text("{")
+    bare = haploop("judge", str(directory), "--json")
+    assert (bare.exit_code, json.loads(bare.stdout)["provisos"]) == (0, [])
 
 
 def test_a_run_out_of_contact_is_called_so(run):

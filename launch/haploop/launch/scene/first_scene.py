@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from pathlib import Path
@@ -14,6 +15,8 @@ from haploop.launch.scene.units import from_text
 from haploop.protocol.names import nearest
 from haploop.protocol.scene.table import Tables
 
+# The wall of a first scene is no farther than this.
+_FAR_MM = 5.0
 _TEXT = """\
 # A scene for haploop. Keys that are not set here come from the files it extends; what those do not set either is left
 # out of the simulation. `haploop check THIS --json` prints the resolved scene; `haploop check --schema` all keys.
@@ -31,7 +34,7 @@ value = "-1 N"
 rise_time = "0.3 s"
 
 [wall]
-position = "-5 mm"  # below this the wall pushes back
+position = "{place}"  # below this the wall pushes back
 stiffness = {wall}
 
 # An element that takes energy out while the device is in the wall; `haploop plugins` lists all elements.
@@ -85,9 +88,20 @@ def first_scene(device: str, hand: str, wall: str | None, folder: Path) -> str:
             device=inline(_named(files[0], "devices", folder)),
             hand=inline(_named(files[1], "hands", folder)),
             wall=inline(wall),
+            place=_place(_table(said, ("hand",)).get("stiffness", 0.0)),
         ),
         said,
     )
+
+
+def _place(stiffness: float | str) -> str:
+    """Returns where the wall begins: 5 mm on the way, or half as far as 1 N takes a hand of this stiffness."""
+    try:
+        of_hand = float(stiffness if isinstance(stiffness, float | int) else from_text(stiffness, "N/m"))
+    except ValueError:
+        of_hand = 0.0  # the scene tells what is wrong with it
+    reach_mm = 1e3 / of_hand if of_hand > 0.0 else math.inf
+    return f"-{min(_FAR_MM, reach_mm / 2.0):.2g} mm"
 
 
 def _left_to_files(text: str, said: Layers) -> str:

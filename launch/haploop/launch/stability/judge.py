@@ -153,13 +153,20 @@ def with_verdict(scene: Scene, summary: Summary, find: Callable[[], Finding], ou
     else:
         return summary
     window = summary["window"]
-    # What a window shows of a loop that was changed within it is not the loop that was judged.
-    shown = "oscillation_m", "force_ripple_N"
-    seen_m, ripple_N = (window.get(name) if window.get("changed_s") is None else None for name in shown)
-    summary = finite(summary | entries_of(finding, scene, window["from_s"], seen_m, ripple_N))
+    summary = finite(summary | entries_of(finding, scene, window["from_s"], *seen_in(window)))
     if out:
         write_summary(summary, out)
     return summary
+
+
+def seen_in(window: Summary) -> tuple[float | None, float | None]:
+    """Returns how far the run itself swung in its last window, m, and its command there, N; None where unknown.
+
+    What a window shows of a loop that was changed within it is not the loop that is judged.
+    """
+    if window.get("changed_s") is not None:
+        return None, None
+    return window.get("oscillation_m"), window.get("force_ripple_N")
 
 
 def entries_of(

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from haploop.tools.command.given import print_note
 from haploop.tools.command.options import FAILED, WRONG_USE, Directory, Json, leave, plain_errors, print_json
+
+if TYPE_CHECKING:
+    from haploop.logger.summary import Summary
 
 
 def replay(directory: Directory, json: Json = False) -> None:
@@ -47,7 +50,9 @@ def judge(directory: Directory, json: Json = False) -> None:
     diverged, no-contact or undecided.
     """
     from haploop.launch.runs.replay import ReplayError, demand_own, logged_run, repeatable
-    from haploop.launch.stability.judge import entries_of, judge_scene
+    from haploop.launch.runs.run_files import recorded_summary
+    from haploop.launch.stability.judge import entries_of, judge_scene, seen_in
+    from haploop.logger.log import LogError
     from haploop.logger.verdict.measures import WINDOW_S
     from haploop.protocol.transport.prints import unheard
     from haploop.tools.render.report import finding_table
@@ -62,7 +67,11 @@ def judge(directory: Directory, json: Json = False) -> None:
                 demand_own(recorded, scene)
                 finding = judge_scene(scene, kinds, events, thorough=True, causes=True)
                 last_s = float(recorded["/controller"]["timestamp"][-1])
-                found = entries_of(finding, scene, last_s - min(WINDOW_S, last_s / 2.0))["stability"]
+                summary: Summary = {}
+                with suppress(LogError):  # the log is enough for the verdict, if not for all that is told beside it
+                    summary = recorded_summary(directory) or {}
+                seen = seen_in(summary.get("window", {}))
+                found = entries_of(finding, scene, last_s - min(WINDOW_S, last_s / 2.0), *seen)["stability"]
         except ReplayError as error:
             leave(str(error), WRONG_USE)
     if json:
