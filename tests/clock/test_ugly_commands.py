@@ -14,6 +14,7 @@ from haploop.launch.clock.clock import Clock
 from haploop.launch.clock.commands import Answer, Commands
 from haploop.launch.clock.roster import Roster
 from haploop.launch.spec import RunSpec
+from haploop.protocol.changes import Change, restoration
 from haploop.protocol.scene.scene import ElementTable
 from haploop.protocol.ticks import Timebase
 from helpers.runs.clocks import DAMPING, TICKS, clock, granted
@@ -183,6 +184,20 @@ def test_undo_takes_changes_back_one_by_one_the_last_first() -> None:
     assert [sorted(event.keys() & {"set", "swap"}) for _, event in subject.events[2:]] == [["swap"], ["set"]]
     ok, text, _ = at_once(steer, "undo", {})
     assert (ok, text) == (False, "There is nothing to undo: no swap or set requested by a command is left.")
+
+
+def test_undo_passes_over_a_swap_that_was_taken_back_because_its_element_failed() -> None:
+    """It swapped in once more what had returned already, and counted as the undoing of the swap that had failed."""
+    subject = clock()
+    granted(subject, 0)
+    steer = Commands(subject, RunSpec(subject.present(), dict(KINDS), Path("out")), Roster)
+    assert at_once(steer, "swap", {"swap": {**DAMPING, "damping": 0.1}, "element": 0})[0]
+    failing = at_once(steer, "swap", {"swap": {**DAMPING, "damping": 0.2}, "element": 0, "at": 0.5})[2]["tick"]
+    back = Change.from_dict(failing + 5, {"swap": {**DAMPING, "damping": 0.1}, "element": 0})
+    subject.note(restoration(back, "It failed."))
+    ok, text, _ = at_once(steer, "undo", {})
+    assert (ok, text) == (True, "element 0 becomes damping (damping 0.1 N s/m) will not happen")
+    assert not at_once(steer, "undo", {})[0], "the failed swap has gone, and the first is undone"
 
 
 class Switched(Element):

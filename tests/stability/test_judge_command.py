@@ -69,6 +69,7 @@ dissipation = [{ kind = "damping", damping = 4.56 }]
 """
 
 
+@pytest.mark.slow
 def test_what_is_told_of_the_runs_own_motion_is_told_by_judge_too_and_without_a_summary_left_out(run, tmp_path):
     """The run swings by 6.1 um, the pushed loop by 23 um."""
     (tmp_path / "two.toml").write_text(TWO_SWINGS)
