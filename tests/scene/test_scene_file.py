@@ -170,6 +170,10 @@ def test_extends_is_a_path_or_a_list_of_them(files, extends):
         (b"# nothing but this\n", "The file is empty; a scene needs at least a duration and a [device]."),
         (b'# a\ntitle = "\xff"\n', ":2: A scene must be UTF-8 text, but this line is not; save the file as UTF-8."),
         (b"a = 1\nb = = 2\n", ":2: This is not valid TOML: Invalid value (at line 2, column 5)."),
+        (
+            b"a = 1\nkind = ramp\n",
+            ':2: This is not valid TOML: Invalid value (at line 2, column 8). Text stands in quotes: "ramp".',
+        ),
         (b"a = 1\nb = [2,\n", ":2: This is not valid TOML: "),
         (b"seed = " + 5000 * b"9", "This is not valid TOML: "),
         (b"a = " + 5000 * b"[", "Tables and lists may be nested at most 32 deep."),

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from haploop.protocol.changes import Change, restoration
 from haploop.view.look.compare import Changes
 from haploop.view.store.history import History
 from helpers.runs.seen import COUNT_M, TIME, history_of, sine
@@ -32,6 +33,16 @@ def test_the_two_sides_of_a_change_are_kept_also_when_the_history_has_forgotten_
     pair = changes.pair(history)
     assert pair
     assert pair[1] is before
+
+
+def test_a_swap_that_was_taken_back_is_not_credited_with_what_came_after_it():
+    """For half a minute the page named an element that had been at work for 16 ticks."""
+    history, changes = history_of(sine(40.0, 1e-3), lambda t: 0.1), Changes(COUNT_M)
+    swap = {"swap": {"kind": "damping", "damping": 1.0}, "element": 0}
+    changes.note(history, [(2000, swap), (2016, restoration(Change.from_dict(2016, swap), "It failed."))])
+    pair = changes.pair(history)
+    assert pair
+    assert pair[0] == 2016
 
 
 @pytest.mark.parametrize(("first", "lacking"), [(0, (950, 1050)), (0, (999, 1050)), (1200, None)])

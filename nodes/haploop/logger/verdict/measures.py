@@ -29,8 +29,7 @@ UNTOLD = {
     "so the window does not show the loop as it is now.",
 }
 _SWINGING = (
-    f"; to be called swinging, it must do so {CROSSINGS} times or more, in the second half at least half as wide as in "
-    "the first."
+    f"; swinging is to do so {CROSSINGS} times or more, in the second half at least half as wide as in the first."
 )
 _RULES = {
     "swings": "From {from_s:.6g} s on the position swung through the middle of its motion {times} times by more than "

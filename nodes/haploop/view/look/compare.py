@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from haploop.protocol.changes import Event, is_change
+from haploop.protocol.changes import Event, is_change, refused_change
 from haploop.view.look.budget import budget
 from haploop.view.look.sight import Sight, see, window_ticks
 from haploop.view.store.history import History
@@ -28,7 +28,7 @@ class Half:
 
 
 class Changes:
-    """Keeps the half second before every swap and set of a run, which a history of full rows forgets."""
+    """Keeps the half second before every swap, set and taking back of a swap, which a history of full rows forgets."""
 
     def __init__(self, resolution_m: float, most_N: float = math.inf) -> None:
         self._limits = resolution_m, most_N
@@ -39,9 +39,12 @@ class Changes:
         """Returns the tick of the last change before tick ``end``; 0 without one."""
         return max((tick for tick in self._ticks if tick < end), default=0)
 
-    def note(self, history: History, events: Iterable[tuple[int, Event]]) -> None:
+    def note(self, history: History, events: Sequence[tuple[int, Event]]) -> None:
         """Records the changes among these events, and keeps what was before those that the history has reached."""
-        self._ticks = sorted({tick for tick, event in events if is_change(event)})
+        returned = (refused_change(event) for _, event in events if "restored" in event)
+        self._ticks = sorted(
+            {tick for tick, event in events if is_change(event)} | {back.tick for back in returned if back}
+        )
         for tick in self._ticks[-_MOST:]:
             if tick and tick not in self._before and history.end_tick >= tick:
                 self._before[tick] = self._half(history, self.since(tick), tick)

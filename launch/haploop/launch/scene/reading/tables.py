@@ -69,7 +69,7 @@ def _line_of(problem: str, text: str) -> int | None:
 
 
 def _hint(problem: str, text: str) -> str:
-    """Returns how to write a value for which TOML has no form: a decimal comma, or a unit without quotes."""
+    """Returns how to write a value for which TOML has no form: a decimal comma, a unit or text without quotes."""
     if re.search(r"Illegal character '\\n'|Unterminated string|Expected \"'", problem):
         return " A quotation mark is not closed."
     line = re.search(r"at line (\d+)", problem)
@@ -79,6 +79,8 @@ def _hint(problem: str, text: str) -> str:
         return f" Write decimals with a point, not a comma: {value.replace(',', '.')}."
     if re.fullmatch(r"[+-]?\d[\d.,]*\s*[^\W\d][\w */^.]*", value):
         return f' A number with its unit must be text in quotes: "{value.replace(",", ".")}".'
+    if re.fullmatch(r"[^\W\d][\w ./-]*", value):
+        return f' Text stands in quotes: "{value}".'
     return ""
 
 
