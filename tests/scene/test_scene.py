@@ -118,6 +118,10 @@ def test_what_must_be_there_is_asked_for(key):
         ({"dissipation": [{"kind": "none"}]}, 'dissipation.0.kind is "none". Allowed: '),
         ({"hand": {"force": 1.0}}, "hand.force is 1.0. It must be a table."),
         (
+            {"hand": {"force": {"kind": "trace"}}},
+            'hand.force.time is missing. It must be a list of numbers. A text file may hold both: file = "push.csv".',
+        ),
+        (
             {"clock": {"plant_rate": 1500}},
             "clock.control_rate is 1000. The control_rate must divide plant_rate, but 1500 Hz is 1.5 times 1000 Hz; "
             "the nearest legal values are a control_rate of 750 Hz or 1500 Hz, or a plant_rate of 1000 Hz or 2000 Hz.",

@@ -45,6 +45,10 @@ _OWN: dict[KeyPath, str] = {
     ("force", "kind"): "A hand force",
 }
 _A_SWAP = 'It must be a table, such as { kind = "damping", damping = 0.8 }.'
+_TYPES = {"array": "a list of numbers", "string": "text in quotes", "object": "a table", "boolean": "true or false"}
+# Keys that a file may give instead.
+_IN_A_FILE = (("hand", "force", "time"), ("hand", "force", "force"))
+_OF_A_FILE = ' A text file may hold both: file = "push.csv".'
 _FORMS = {
     "bool_type": "It must be true or false.",
     "string_type": "It must be text in quotes.",
@@ -192,7 +196,8 @@ def complain(layers: Layers, what: str, message: str, key: KeyPath, schema: Sche
             )
             layers.complain(key, expected, f"is not a key of {where}", nearest(name, keys))
         case "missing":
-            layers.complain(key, f"It must be {_form(rule)}.{_of_a_device(layers, key)}", "is missing")
+            instead = _OF_A_FILE if key in _IN_A_FILE else _of_a_device(layers, key)
+            layers.complain(key, f"It must be {_form(rule)}.{instead}", "is missing")
         case "union_tag_not_found":
             allowed = alternatives(schema, rule)
             layers.complain((*key, "kind"), f"Allowed: {', '.join(allowed)}.", "is missing")
@@ -261,7 +266,9 @@ def _of_a_device(layers: Layers, key: KeyPath) -> str:
 def _form(rule: Schema) -> str:
     if "properties" in rule:
         return f"a table with {', '.join(rule.get('required', rule['properties']))}"
-    return rule["description"].rpartition(": ")[2] if "description" in rule else rule.get("type", "given")
+    if "description" in rule:
+        return rule["description"].rpartition(": ")[2]
+    return _TYPES.get(rule.get("type", ""), "given")
 
 
 def _plain(location: tuple[str | int, ...], tagged: set[KeyPath]) -> KeyPath:
