@@ -118,8 +118,8 @@ def test_what_must_be_there_is_asked_for(key):
         ({"dissipation": [{"kind": "none"}]}, 'dissipation.0.kind is "none". Allowed: '),
         ({"hand": {"force": 1.0}}, "hand.force is 1.0. It must be a table."),
         (
-            {"hand": {"force": {"kind": "trace"}}},
-            'hand.force.time is missing. It must be a list of numbers. A text file may hold both: file = "push.csv".',
+            {"hand": {"force": {"kind": "trace", "time": [0.0]}}},
+            'hand.force.force is missing. It must be a list of numbers. A text file may hold both: file = "push.csv".',
         ),
         (
             {"clock": {"plant_rate": 1500}},
