@@ -230,7 +230,7 @@ def test_a_wall_whose_stiffness_changes_with_the_depth_has_no_limit_and_says_so(
             "wall.damping is 3.0. It is used only with a wall of the kind kelvin-voigt",
         ),
         (OWN["hunt-crossley"] | {"kind": "hunt-crossley", "exponent": 1.3}, "It must be a multiple of 0.25."),
-        ({"kind": "hunt"}, 'wall.kind is "hunt". Allowed: spring, kelvin-voigt'),
+        ({"kind": "hunt"}, 'wall.kind is "hunt"; did you mean hunt-crossley? Allowed: spring, kelvin-voigt'),
     ],
 )
 def test_a_wall_with_the_wrong_keys_is_refused_with_a_sentence(table: dict[str, Any], said: str) -> None:
