@@ -15,9 +15,12 @@ const SWINGS = new Set(["swinging", "growing", "dying away"]);
 export const isSwinging = (sight) => SWINGS.has(sight?.word) || SWINGS.has(sight?.so_far_word);
 const NOT_YET = { awaited: "being judged", unknown: "not known" };
 
-/** The state of the verdict, in a word. */
-export const told = ({ verdict, verdict_is: is, sight, phase }) =>
-  isJudged({ verdict, verdict_is: is }) ? verdict : (NOT_YET[is] ?? (sight?.so_far && phase === "ended" ? "too short" : sight?.word));
+/** The state of the verdict, in a word; where the picture still shows a swing, `steady` is that of the loop held still. */
+export function told(state) {
+  const { verdict, verdict_is: is, sight, phase } = state;
+  if (isJudged(state)) return verdict === "steady" && moved(state) ? "steady if held still" : verdict;
+  return NOT_YET[is] ?? (sight?.so_far && phase === "ended" ? "too short" : sight?.word);
+}
 
 /** Whether there is a word that rests on more than what was seen. */
 export const isJudged = ({ verdict, verdict_is: is }) => is === "judged" || verdict === "diverged";

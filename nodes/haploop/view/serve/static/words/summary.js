@@ -12,7 +12,7 @@ export function showSummary(state) {
   const { summary, out } = state;
   const panel = byId("summary");
   panel.hidden = !summary;
-  const known = summary ? `${summary.trajectory_sha256} ${out} ${state.verdict_is}` : "";
+  const known = summary ? `${summary.trajectory_sha256} ${out} ${state.verdict_is} ${told(state)}` : "";
   if (!summary || panel.dataset.known === known) return;
   panel.dataset.known = known;
   panel.replaceChildren(
