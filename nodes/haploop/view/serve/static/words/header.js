@@ -18,7 +18,7 @@ const NOT_YET = { awaited: "being judged", unknown: "not known" };
 /** The state of the verdict, in a word; where the picture still shows a swing, `steady` is that of the loop held still. */
 export function told(state) {
   const { verdict, verdict_is: is, sight, phase } = state;
-  if (isJudged(state)) return verdict === "steady" && moved(state) ? "steady if held still" : verdict;
+  if (isJudged(state)) return verdict === "steady" && moved(state) ? "steady if held" : verdict;
   return NOT_YET[is] ?? (sight?.so_far && phase === "ended" ? "too short" : sight?.word);
 }
 
