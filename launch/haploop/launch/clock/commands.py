@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from haploop.controller.dissipation import ElementError, PluginError
 from haploop.launch.clock import device_time
@@ -16,10 +16,11 @@ from haploop.launch.clock.plugin_swap import swap_plugin
 from haploop.launch.clock.reloads import Code, Reloads
 from haploop.launch.clock.roster import Roster
 from haploop.launch.clock.seen import when_seen
+from haploop.launch.clock.undo import Made, MadeChanges
 from haploop.launch.plan.effects import notes
 from haploop.launch.scene.mistakes import SceneError
 from haploop.launch.spec import OutputError
-from haploop.protocol.changes import Event, describe, refused_change
+from haploop.protocol.changes import Event, describe
 from haploop.protocol.scene.paths import value_at
 from haploop.protocol.scene.scene import NO_ELEMENT, ElementTable
 from haploop.protocol.scene.table import Tables
@@ -40,15 +41,6 @@ _PROBATION = {
 }
 
 
-class _Undo(NamedTuple):
-    """A change that a command made, the one that takes it back (None if none can), and the code before a reload."""
-
-    tick: int
-    event: Event
-    back: Event | None
-    code: Code | None = None
-
-
 def pace_in_words(pace: float) -> float | str:
     """Returns a pace as people write it: a number, or ``free``."""
     return "free" if math.isinf(pace) else pace
@@ -64,8 +56,7 @@ class Commands:
         self._clock, self._spec, self._roster, self._reloads = clock, spec, roster, Reloads(clock, spec)
         self._rate = spec.scene.clock.control_rate
         self._is_trying = False
-        self._undo_by: list[_Undo] = []
-        self._heard: list[Event] = []
+        self._made = MadeChanges()
         self._verbs = {
             "status": self._status,
             "options": self._options,
@@ -199,34 +190,16 @@ class Commands:
 
     def _settle(self, withdrawn: Event | None = None) -> None:
         """Forgets swaps and reloads that have failed since, and their code: nothing is left of them to undo."""
-        self._forget(*self._reloads.settle(withdrawn), *self._taken_back())
-
-    def _taken_back(self) -> list[Event]:
-        """Returns the swaps without a new file that were taken back since this was last asked.
-
-        What is on record names the element that has returned, which the last swap in its place had replaced.
-        """
-        off = list[Event]()
-        for _, event in self._clock.events:
-            if "restored" not in event or any(event is one for one in self._heard):
-                continue
-            self._heard.append(event)
-            back = refused_change(event)
-            if back and "code" not in event:
-                swaps = [each for each in self._undo_by if "swap" in each.event and each.tick < back.tick]
-                off += [each.event for each in swaps if each.event["element"] == back.element][-1:]
-        return off
-
-    def _forget(self, *events: Event) -> None:
-        self._undo_by = [each for each in self._undo_by if not any(each.event is event for event in events)]
+        self._made.forget(*self._reloads.settle(withdrawn))
+        self._made.forget_taken_back(self._clock.events)
 
     def _on_probation(self, done: Done) -> Generator[None, None, Done]:
         """Returns the answer to a swap to an element that may raise, once the element has worked for a tick."""
-        asked = self._undo_by[-1].event
+        asked = self._made.last.event
         try:
             text, data = yield from when_seen(self._clock, self._roster, *done, by="controller")
         except ClockError:  # it was refused, and nothing has changed
-            self._forget(asked)
+            self._made.forget(asked)
             self._settle()
             raise
         return f"{text}\n{_PROBATION[self._spec.scene.run.faulty_swap]}", data
@@ -236,13 +209,13 @@ class Commands:
         swap, element = change["swap"], change["element"]
         text, data = f"element {element} becomes {swap['kind']} at {self._at(tick)}", {"tick": tick}
         if swap["kind"] == NO_ELEMENT and element < len(before) - 1:  # those after it move up: no swap restores it
-            self._undo_by.append(_Undo(tick, self._clock.newest, None))
+            self._made.add(Made(tick, self._clock.newest, None))
             return text, data
         back = before[element].as_dict() if element < len(before) else {"kind": NO_ELEMENT}
         words = " ".join([back["kind"], *(f"{key}={as_typed(back[key])}" for key in back if key != "kind")])
         where = f" --element {element}" if element else ""
         undo: Event = {"swap": back, "element": element}
-        self._undo_by.append(_Undo(tick, self._clock.newest, undo, code))
+        self._made.add(Made(tick, self._clock.newest, undo, code))
         return f"{text}; to go back: {'undo' if code else f'swap {words}{where}'}", data | {"before": undo}
 
     def _set(self, set: dict[str, float], at: float | None = None) -> tuple[str, Message]:
@@ -254,7 +227,7 @@ class Commands:
         taken, were = (in_words(before, self._spec.kinds, values) for values in (self._clock.newest["set"], back))
         what = ", ".join(f"{key} = {value}" for key, value in taken.items())
         words = " ".join(f'{key}="{value}"' if " " in value else f"{key}={value}" for key, value in were.items())
-        self._undo_by.append(_Undo(tick, self._clock.newest, {"set": back}))
+        self._made.add(Made(tick, self._clock.newest, {"set": back}))
         known, kinds = notes(before, self._spec.kinds), self._spec.kinds
         found = [note for note in notes(self._clock.scene_at(tick), kinds) if not note.key.startswith("event.")]
         new = [note for note in found if note not in known]  # whoever sets a key again knows that it was set
@@ -266,9 +239,9 @@ class Commands:
 
         An element comes back with the parameters it had, but starts afresh: what it remembered is lost.
         """
-        if not self._undo_by:
+        if not self._made:
             raise ClockError("There is nothing to undo: no swap or set requested by a command is left.")
-        _, asked, back, code = self._undo_by[-1]
+        _, asked, back, code = self._made.last
         units = units_at(self._clock.present(), self._spec.kinds)
         what = describe(asked, units)
         if back is None:
@@ -287,7 +260,7 @@ class Commands:
             else:
                 tick = self._clock.change(back)
             text, data = f"undone: {what}; {describe(back, units)} at {self._at(tick)}", {"tick": tick, **back}
-        self._forget(asked)
+        self._made.forget(asked)
         return text, data
 
 

@@ -165,7 +165,7 @@ def load(
         SceneError: the scene cannot be run; the error holds every mistake.
         PluginError: a file defines nothing usable, or a class is not a usable element.
         ElementError: an element's own code does not take its parameters.
-        TypeError: the path is none.
+        TypeError: what was given is no path.
     """
     if not isinstance(path, str | os.PathLike):
         raise TypeError(f"A scene is a file, or a name that haploop scenes lists, but {path!r:.60} was given.")
