@@ -66,7 +66,7 @@ async def read(address: str, watch: dict[str, float | None], pid: int = 0, secon
             if not began and now >= settled:
                 began, used = now, cpu_s(pid) if pid else 0.0
             if message.type is aiohttp.WSMsgType.BINARY:
-                await ws.send_str('{"type": "drawn"}')
+                await ws.send_str('{"type": "drawn", "snapshots": 1}')
                 if began:
                     snapshots, size = snapshots + 1, size + len(message.data)
             if began and now >= began + seconds:

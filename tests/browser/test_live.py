@@ -148,7 +148,7 @@ def test_what_the_page_draws_are_the_numbers_of_the_log(running, viewing):
             socket.onopen = () => socket.send(JSON.stringify({ type: "watch", span_s: 0.1, points: 2000, end_s: 1.0 }));
             const snapshot = await new Promise(found => socket.onmessage = ({ data }) => {
                 const snapshot = typeof data === "string" ? null : decode(data);
-                if (snapshot) socket.send(JSON.stringify({ type: "drawn" }));
+                if (snapshot) socket.send(JSON.stringify({ type: "drawn", snapshots: 1 }));
                 // What was logged before the viewer joined comes a moment later than what it hears itself.
                 const filled = snapshot && ["position", "force", "loop"].every(
                     name => snapshot.tables[name]?.columns.every(({ values }) => !values.some(Number.isNaN)));

@@ -105,7 +105,7 @@ class Tab:
             if message.type is aiohttp.WSMsgType.BINARY:
                 self._take(decode(message.data))
                 with suppress(ConnectionError):
-                    await self.socket.send_json({"type": "drawn"})
+                    await self.socket.send_json({"type": "drawn", "snapshots": 1})
                 continue
             told = json.loads(message.data)
             if told["type"] == "answer":

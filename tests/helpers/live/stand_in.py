@@ -154,7 +154,7 @@ class StandIn:
 
     def drawn(self) -> None:
         """Waits until every page has drawn the last snapshot that it was sent."""
-        said = lambda: sum(message["type"] == "drawn" for message in self.received)  # noqa: E731
+        said = lambda: sum(message["snapshots"] for message in self.received if message["type"] == "drawn")  # noqa: E731
         wait_for("the drawing", lambda: said() == self._sent)
 
     # From the test's thread

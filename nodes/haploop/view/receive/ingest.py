@@ -73,12 +73,10 @@ def _follows(one: Block, other: Block) -> bool:
 
 def _joined(run: list[Block], names: Iterable[str], shared: int = 0) -> dict[str, np.ndarray]:
     """Joins columns of blocks, without the last ``shared`` bytes of all but the last block: the next one has them."""
+    wanted, until = list(names), -shared or None
     *earlier, last = [block["columns"] for block in run]
-    until = -shared or None
-    return {
-        name: np.frombuffer(b"".join([*[columns[name][:until] for columns in earlier], last[name]]), "<f8")
-        for name in names
-    }
+    parts = [part for name in wanted for part in (*[columns[name][:until] for columns in earlier], last[name])]
+    return dict(zip(wanted, np.frombuffer(b"".join(parts), "<f8").reshape(len(wanted), -1), strict=True))
 
 
 def _plant(history: History, run: list[Block]) -> None:

@@ -2,7 +2,7 @@
 
 At most four snapshots are on their way to a page that has not yet reported drawing them: a slow or hidden page costs
 nothing, and one whose answers take as long as four pictures, as beside a run that uses every core, still gets each.
-What stands beside the charts over time comes with one snapshot in three, and with the last: nobody reads it more often.
+What stands beside the charts over time comes with one snapshot in four, and with the last: nobody reads it more often.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _LONGEST_REASON = 120
 _FEWEST_POINTS, _MOST_POINTS = 50, 8000
 _LONGEST_S = 1e9
 # What stands beside the charts over time comes with one snapshot in this many: it is read more than watched.
-_BESIDE_EVERY = 3
+_BESIDE_EVERY = 4
 # Most snapshots that go out before the page has drawn them.
 _MOST_UNDRAWN = 4
 # Commands that a page may send; the clock answers more.
@@ -72,9 +72,9 @@ class Page:
             with contextlib.suppress(asyncio.CancelledError):
                 await showing
 
-    async def _take(self, message: Viewport | Command | None) -> None:
-        if message is None:
-            was_full, self._undrawn = self._undrawn >= _MOST_UNDRAWN, max(0, self._undrawn - 1)
+    async def _take(self, message: Viewport | Command | Drawn) -> None:
+        if isinstance(message, Drawn):
+            was_full, self._undrawn = self._undrawn >= _MOST_UNDRAWN, max(0, self._undrawn - message.snapshots)
             if was_full:
                 await self._send_snapshot()
             return
@@ -163,8 +163,15 @@ class Command:
     arguments: Message
 
 
-def parse_message(text: str) -> Viewport | Command | None:
-    """Returns what a text says: ``watch`` as a viewport, ``command`` as a command, ``drawn`` of a snapshot as None.
+@dataclass(frozen=True)
+class Drawn:
+    """What a page says of the snapshots that it has drawn since it said so last: how many."""
+
+    snapshots: int
+
+
+def parse_message(text: str) -> Viewport | Command | Drawn:
+    """Returns what a text says: ``watch`` as a viewport, ``command`` as a command, ``drawn`` as a number of snapshots.
 
     Raises:
         BadMessage: the text says anything else.
@@ -176,14 +183,16 @@ def parse_message(text: str) -> Viewport | Command | None:
     match message:
         case {"type": "watch"}:
             return _watch(message)
-        case {"type": "drawn"}:
-            return None
+        case {"type": "drawn", "snapshots": int(snapshots)} if 0 < snapshots <= _MOST_UNDRAWN:
+            return Drawn(snapshots)
         case {"type": "command", "id": int(number), "verb": str(verb)}:
             token, arguments = message.get("token"), message.get("arguments", {})
             if isinstance(arguments, dict):
                 return Command(number, token if isinstance(token, str) else "", verb, arguments)
     if isinstance(message, dict) and message.get("type") == "command":
         raise BadMessage("A command must have a whole number as id, a verb, and a table of arguments.")
+    if isinstance(message, dict) and message.get("type") == "drawn":
+        raise BadMessage(f"drawn.snapshots must be a whole number from 1 to {_MOST_UNDRAWN}.")
     raise BadMessage("A message must be a JSON object whose type is watch, drawn or command.")
 
 

@@ -10,12 +10,12 @@ from haploop.view.store.lod_level import LodLevel, Ring, extremes
 
 # Buckets of a level that make one of the next: fewer levels cost less, and twice the buckets make up for it.
 FOLD = 4
-# Least rows and ticks of a bucket of the first coarse level: finer ones reach no further back than the rows.
-_LEAST_ROWS, _LEAST_TICKS = 16, 4
+# Ticks of a bucket of the first coarse level: at least so many, and as many as give the ticks in full so many buckets.
+_LEAST_TICKS, _LEAST_BUCKETS = 4, 800
 # Least number of buckets that a coarse level holds, two values each.
 _BUCKETS = 4096
 # Ticks for which buckets are made at once, and buckets of the coarser levels; fewer are not worth the calls.
-_AT_ONCE_TICKS, _AT_ONCE_BUCKETS = 128, 64
+_AT_ONCE_TICKS, _AT_ONCE_BUCKETS = 128, 256
 # Up to this many values are read row by row: the calls for level after level would take longer.
 _FEW_VALUES = 8192
 # Envelopes that are kept, so that the next ones of the same names and buckets compute only what is new.
@@ -48,7 +48,7 @@ class LodSeries:
         # By names and ticks of a bucket: the first tick of the last envelope, and its buckets that are complete.
         self._known: dict[tuple[tuple[str, ...], int], tuple[int, np.ndarray]] = {}
         self._levels = [LodLevel(Ring(recent_ticks * rows_per_tick, 0), 1, rows_per_tick)]
-        self._add_level()
+        self._add_level(1 << max(_LEAST_TICKS, recent_ticks // _LEAST_BUCKETS).bit_length() - 1)
         # No level is given more at once than half of what it certainly holds, so that nothing is lost on the way up.
         self._at_once = min(recent_ticks, _BUCKETS * self._levels[1].ticks) * rows_per_tick // 2
 
@@ -68,9 +68,7 @@ class LodSeries:
     def full_from_tick(self) -> int:
         return self.origin + self._levels[0].start
 
-    def _add_level(self) -> None:
-        first = max(_LEAST_TICKS, _LEAST_ROWS // self.rows_per_tick)
-        ticks = self._levels[-1].ticks * FOLD if len(self._levels) > 1 else first
+    def _add_level(self, ticks: int) -> None:
         self._levels.append(LodLevel(Ring(2 * _BUCKETS, len(self._columns)), ticks, 2))
 
     def begin(self, tick: int) -> None:
@@ -123,7 +121,7 @@ class LodSeries:
         if depth + 1 == len(self._levels):
             if below.ring.end < below.ring.capacity // 4:
                 return  # far from forgetting anything, and short enough to be read as it is
-            self._add_level()
+            self._add_level(below.ticks * FOLD)
         above = self._levels[depth + 1]
         buckets = (below.end - above.end) // above.ticks
         if buckets >= (_AT_ONCE_TICKS // above.ticks if depth == 0 else _AT_ONCE_BUCKETS):
