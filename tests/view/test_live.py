@@ -6,7 +6,7 @@ import aiohttp
 import numpy as np
 import pytest
 
-from helpers.live.browsing import site, to_its_end
+from helpers.live.browsing import decode, site, to_its_end
 from helpers.live.followed import follow, has_logged, same, stands, whole
 from helpers.live.live_run import going, undisturbed
 
@@ -197,6 +197,26 @@ def test_what_stands_beside_the_charts_comes_with_every_fourth_picture_and_the_l
         assert tab.snapshot["tables"].keys() >= {"position", "overview", "loop"}
 
     follow(play, tmp_path, pace=1.0)
+
+
+@pytest.mark.slow
+def test_a_page_that_draws_four_pictures_late_gets_none_of_them_twice(tmp_path):
+    """Each picture it draws makes room for one, while there may be nothing new yet."""
+
+    async def play(run, tab, here):
+        late, ends, undrawn = await here.stream(), [], 0
+        await late.send_json({"type": "watch", "span_s": 0.1})
+        async for message in late:
+            if message.type is aiohttp.WSMsgType.BINARY:
+                ends.append(decode(message.data)["to_s"])
+                undrawn += 1
+            if undrawn == 4:
+                undrawn -= 1
+                await late.send_json({"type": "drawn", "snapshots": 1})
+            if len(ends) == 60:
+                return ends
+
+    assert (np.diff(follow(play, tmp_path, pace=1.0)[8:]) > 0.0).all()
 
 
 def test_who_waits_for_whom_and_what_can_be_chosen_is_told(tmp_path):

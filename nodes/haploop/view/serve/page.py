@@ -76,7 +76,7 @@ class Page:
         if isinstance(message, Drawn):
             was_full, self._undrawn = self._undrawn >= _MOST_UNDRAWN, max(0, self._undrawn - message.snapshots)
             if was_full:
-                await self._send_snapshot()
+                await self._send_snapshot(only_new=True)
             return
         if isinstance(message, Viewport):
             self._viewport, self._until_beside = message, 0
@@ -132,12 +132,13 @@ class Page:
                 self._sent_listing = listing
                 await self._send(listing)
 
-    async def _send_snapshot(self) -> None:
+    async def _send_snapshot(self, only_new: bool = False) -> None:
+        """Sends what is shown now; the same once more if it stays, lacked what stands beside it, and more may come."""
         if self._undrawn >= _MOST_UNDRAWN:
             return
         made = self._viewer.snapshot(self._viewport, beside := self._until_beside == 0)
         if made and made[0] == self._sent_snapshot:
-            if self._until_beside == _BESIDE_EVERY - 1:
+            if only_new or self._until_beside == _BESIDE_EVERY - 1:
                 return
             made, beside = self._viewer.snapshot(self._viewport, True), True  # the last picture is complete
         if made:
