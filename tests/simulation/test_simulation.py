@@ -70,7 +70,7 @@ def test_a_history_that_broke_a_promise_once_keeps_it(what: str, pace: float) ->
 
 # A plant each of whose exchanges takes 0.18 s, so that a block takes longer than the deadline of 2 s.
 _SLOW_BLOCK = replace(_CALM, scene="least", faults=(Slow(When(40, 0.0), "plant", 0.18),))
-_STOPPED_AT_THE_END = replace(_CALM, faults=(SecondLogger(When(1, 0.0), ("held", 0.012)),))
+_STOPPED_AT_THE_END = replace(_CALM, faults=(SecondLogger(When(50, 0.0), ("held", 0.0065)),))
 
 
 # Nothing of what is sent to a stopped logger leaves its sender: the kernel is as good as full.
