@@ -180,7 +180,7 @@ def test_a_paused_run_sends_its_snapshot_once(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_stands_beside_the_charts_comes_with_every_fourth_picture_and_the_last(tmp_path):
+def test_what_stands_beside_the_charts_comes_with_every_fourth_picture_at_least_and_the_last(tmp_path):
     async def play(run, tab, here):
         came = []
         for _ in range(30):
@@ -192,7 +192,7 @@ def test_what_stands_beside_the_charts_comes_with_every_fourth_picture_and_the_l
                 came.append(None)
         seen = [four for four in zip(came, came[1:], came[2:], came[3:], strict=False) if None not in four]
         assert seen
-        assert all(four.count(True) == 1 for four in seen)
+        assert all(any(four) and four[:2] != (True, True) for four in seen)
         await asyncio.to_thread(run.ask, "pause")
         await tab.phase("paused")
         await whole(tab, run, 1)

@@ -27,8 +27,8 @@ Command = Callable[[str, Message], Answer | Generator[None, None, Answer]]
 _AT_ONCE = 200
 # The largest frame taken from anybody but the run's own processes, bytes: a larger one takes ms to read.
 _LARGEST_OF_STRANGERS = 32 * 1024
-# A node that has joined a run is told no more often than this, s, how far the others may go: it works on what it hears,
-# and the queue to one that hangs has room for some 1000 messages.
+# An observer is told no more often than this, s, how far the others may go: it works on what it hears, and the queue to
+# one that hangs has room for some 1000 messages.
 _TOLD_S = 0.02
 
 
@@ -123,7 +123,7 @@ class ClockServer:
     def grant(self) -> None:
         """Tells every node how far it may go and what changes on the way, if that is new.
 
-        A node that has joined the run gets only some of the grants that bring nothing else new.
+        An observer gets only some of the grants that bring nothing else new.
         """
         clock, now = self._clock, self._machine.now()
         until = clock.grant(self.roster.slowest(), now, self.roster.loop_tick())

@@ -133,7 +133,8 @@ class Page:
                 await self._send(listing)
 
     async def _send_snapshot(self, only_new: bool = False) -> None:
-        """Sends what is shown now; the same once more if it stays, lacked what stands beside it, and more may come."""
+        """Sends what is shown now if it is new; else, unless ``only_new``, completes the last, once, if it came without
+        what stands beside the charts."""
         if self._undrawn >= _MOST_UNDRAWN:
             return
         made = self._viewer.snapshot(self._viewport, beside := self._until_beside == 0)
